@@ -124,16 +124,10 @@ class LinkedCells {
   /// Moves a sphere into the next cell along an axis.
   void cross(Slot i, Place& place, int axis, int step) {
     remove(i, place);
-    place.unwrapped[axis] += step;
-    const int to = place.wrapped[axis] + step, count = grid_.count(axis);
-    if (to >= 0 && to < count) {
-      place.wrapped[axis] = static_cast<std::uint16_t>(to);
-    } else {  // through a face of the periodic box
-      place.wrapped[axis] = static_cast<std::uint16_t>(to < 0 ? count - 1 : 0);
-      const std::int32_t boxes = packing_.image(packing_.pack(0, place.boxes))[axis] + step;
+    if (advance(place, axis, step)) {
+      const std::int32_t boxes = packing_.image(packing_.pack(0, place.boxes - step * one_[axis]))[axis] + step;
       if (std::abs(boxes) > packing_.largest()) throw_too_far();
       widest_ = std::max(widest_, std::abs(boxes));
-      place.boxes += step * one_[axis];
     }
     insert(i, place);
   }
@@ -187,7 +181,8 @@ class LinkedCells {
 
   static constexpr unsigned kKinds = 2 * D - 1;         // of rows: around, and one step back or forth along an axis
   static constexpr unsigned kAround = 2 * D;            // instead of a face
-  static constexpr std::uint32_t kIrregular = 1 << 20;  // edges() of cells with neighbours at other distances
+  static constexpr unsigned kMostPatterns = 16;         // along an axis; rows_ has their combinations
+  static constexpr std::uint32_t kIrregular = 1 << 20;  // pattern() of cells with none of these
   /// The cells to search ahead of a face, or around.
   struct Region {
     alignas(16) std::uint32_t wanted[4];  // as in CellsTask
@@ -209,7 +204,7 @@ class LinkedCells {
   struct Step {
     std::ptrdiff_t offset;  // is added to the number of the cell
     std::uint32_t away;     // the boxes that it crosses, as in HeadStep
-    std::uint32_t edges;    // is added to the index in rows_: whether the cell is the first or the last one
+    std::uint32_t pattern;  // is added to the index in rows_: how its neighbours are stored
   };
 
   std::uint32_t shifted(std::int32_t boxes) const { return static_cast<std::uint32_t>(boxes) << packing_.slot_bits; }
@@ -233,36 +228,61 @@ class LinkedCells {
   void lay_out() {
     confined_ = false;
     std::ptrdiff_t cells = grid_.count(D - 1) + 2;
+    std::uint32_t combinations = kKinds;
+    std::array<std::vector<std::int32_t>, D - 1> examples;  // a cell of each pattern
     for (int k = D - 2; k >= 0; --k) {
       confined_ = confined_ || grid_.rows(k) != grid_.count(k);
+      const std::int32_t count = grid_.count(k);
       steps_[k].clear();
-      for (std::int32_t c = -1; c <= grid_.count(k); ++c) {
-        const std::int32_t count = grid_.count(k), boxes = c < 0 ? -1 : c < count ? 0 : 1;
-        const unsigned edges = (c == 0 ? 1u : 0u) + (c == count - 1 ? 2u : 0u);
-        const bool regular =
-            grid_.rows(k) == count || (boxes == 0 && edges == 0 && grid_.row(k, c - 1) + 1 == grid_.row(k, c) &&
-                                       grid_.row(k, c) + 1 == grid_.row(k, c + 1));
-        steps_[k].push_back({cells * grid_.row(k, c - boxes * count), shifted(boxes * one_[k]),
-                             regular ? kKinds * (edges << 2 * k) : kIrregular});
+      for (std::int32_t c = -1; c <= count; ++c) {
+        const std::int32_t boxes = c < 0 ? -1 : c < count ? 0 : 1;
+        steps_[k].push_back({cells * grid_.row(k, c - boxes * count), shifted(boxes * one_[k]), kIrregular});
+      }
+      for (std::int32_t c = 0; c < count; ++c) {
+        const auto same = [&](std::int32_t other) {
+          const Step *const a = &steps_[k][static_cast<std::size_t>(c) + 1],
+                            *const b = &steps_[k][static_cast<std::size_t>(other) + 1];
+          const bool ends = periodic_[k] || ((c == 0) == (other == 0) && (c == count - 1) == (other == count - 1));
+          return ends && std::ranges::all_of(std::array{-1, 1}, [&](int d) {
+                   return a[d].offset - a->offset == b[d].offset - b->offset && a[d].away == b[d].away;
+                 });
+        };
+        const auto known = std::ranges::find_if(examples[k], same);
+        const auto pattern = static_cast<std::uint32_t>(known - examples[k].begin());
+        if (pattern == kMostPatterns) continue;
+        if (known == examples[k].end()) examples[k].push_back(c);
+        steps_[k][static_cast<std::size_t>(c) + 1].pattern = combinations * pattern;
       }
       cells *= grid_.rows(k);
+      combinations *= static_cast<std::uint32_t>(examples[k].size());
     }
     first_.assign(static_cast<std::size_t>(cells + 3), kEmpty);
-    rows_.clear();
-    rows_.resize(std::size_t{kKinds} << 2 * (D - 1));
+    rows_.resize(combinations);
     Place place{};
-    for (place.wrapped[0] = 0; place.wrapped[0] < grid_.count(0); ++place.wrapped[0])
-      for (place.wrapped[1] = 0; place.wrapped[1] < (D == 3 ? grid_.count(1) : 1); ++place.wrapped[1])
-        if (const unsigned at = edges(place); at < kIrregular && rows_[at].count == 0)
-          for (unsigned kind = 0; kind < kKinds; ++kind) {
-            const int axis = kind == 0 ? D : (static_cast<int>(kind) - 1) / 2;
-            make_rows(place, axis, kind % 2 == 0 ? 1 : -1, rows_[at + kind]);
-          }
+    for (const std::int32_t a : examples[0])
+      for (const std::int32_t b : D == 3 ? examples[D - 2] : std::vector<std::int32_t>{0}) {
+        place.wrapped[0] = static_cast<std::uint16_t>(a);
+        if (D == 3) place.wrapped[1] = static_cast<std::uint16_t>(b);
+        for (unsigned kind = 0; kind < kKinds; ++kind) {
+          const int axis = kind == 0 ? D : (static_cast<int>(kind) - 1) / 2;
+          make_rows(place, axis, kind % 2 == 0 ? 1 : -1, rows_[pattern(place) + kind]);
+        }
+      }
   }
-  unsigned edges(const Place& place) const {
-    unsigned edges = 0;
-    for (int k = 0; k + 1 < D; ++k) edges += step(place, k).edges;
-    return edges;
+  /// How the neighbours of a cell are stored: an index in rows_.
+  unsigned pattern(const Place& place) const {
+    unsigned pattern = 0;
+    for (int k = 0; k + 1 < D; ++k) pattern += step(place, k).pattern;
+    return pattern;
+  }
+  /// Moves a place into the next cell along an axis; whether through a face of the periodic box.
+  bool advance(Place& place, int axis, int step) const {
+    const int to = place.wrapped[axis] + step, count = grid_.count(axis);
+    place.unwrapped[axis] += step;
+    place.wrapped[axis] = static_cast<std::uint16_t>(to < 0 ? count - 1 : to < count ? to : 0);
+    if (to >= 0 && to < count) return false;
+    place.boxes += step * one_[axis];
+    return true;
   }
   /// Sets the rows of the cells around a cell, or only of those that are `step` cells away along an axis.
   void make_rows(const Place& place, int axis, int step, HeadRows& rows) const {
@@ -327,7 +347,7 @@ class LinkedCells {
   /// Sets a task to the cells ahead of a face, or around.
   void aim(const Place& place, unsigned face, Candidates& found) const {
     const Region& region = kRegions[face];
-    const unsigned at = edges(place);
+    const unsigned at = pattern(place);
     if (at >= kIrregular) [[unlikely]]
       return aim_at(place, face == kAround ? D : static_cast<int>(face / 2), face % 2 == 1 ? 1 : -1, region, found);
     set(place, region, &rows_[at + region.kind], found.task);
@@ -337,21 +357,11 @@ class LinkedCells {
     make_rows(place, axis, step, found.rows);
     set(place, region, &found.rows, found.task);
   }
-  /// The cells that the next step along an axis will make neighbours; none if they are beyond the end of the box. If
-  /// `step` is 0: the cells around.
-  void aim_beyond(const Place& place, int axis, int step, Candidates& found) const {
+  /// The cells that the next step along an axis will make neighbours, or around if `step` is 0.
+  void aim_beyond(Place place, int axis, int step, Candidates& found) const {
     if (step == 0) return aim(place, kAround, found);
-    const int to = place.wrapped[axis] + 2 * step;
-    const unsigned face = static_cast<unsigned>(2 * axis + (step > 0 ? 1 : 0));
-    if (to < -1 || to > grid_.count(axis)) {
-      found.rows.count = 0;
-      found.task.rows = &found.rows;
-    } else if (axis == D - 1) {
-      aim(place, face, found);
-      found.task.first += step;
-    } else {
-      aim_at(place, axis, 2 * step, kRegions[face], found);
-    }
+    advance(place, axis, step);
+    aim(place, static_cast<unsigned>(2 * axis + (step > 0 ? 1 : 0)), found);
   }
   void set(const Place& place, const Region& region, const HeadRows* rows, CellsTask& task) const {
     task.first = first_.data() + index(place) + region.shift;
@@ -421,7 +431,7 @@ class LinkedCells {
   std::int32_t one_[D];                         // one box along each axis, as a linear image
   bool periodic_[D];
   CellFaces faces_;
-  std::vector<HeadRows> rows_;  // by edges() and kind
+  std::vector<HeadRows> rows_;  // by pattern() and kind
   bool confined_ = false;
   // By cell, in rows along the last axis: the first sphere with the image of its cell, and kMoreInCell; or kEmpty.
   PageVector<std::uint32_t> first_;
