@@ -47,13 +47,16 @@ void Ownership<D>::watch(double now) {
   watched_.clear();
   quiet_.clear();
   speed_.clear();
-  turned_.clear();
+  turned_.resize(role_.size());
+  turns_ = 0;
   watched_at_.assign(role_.size(), kUnwatched);
   const double reach = bisection_.reach() + (kWindowsBetweenSearches + 1) * max_displacement_;
-  for (Slot i = 0; i < core_.flights().size(); ++i)
-    if (is_ghost(i) ||
-        (owns(i) && bisection_.depth(number_, bisection_.wrapped(core_.flights().at(i, now).x)) <= reach))
-      watch_over(i);
+  for (Slot i = 0; i < core_.flights().size(); ++i) {
+    if (is_ghost(i)) watch_over(i);
+    if (!owns(i)) continue;
+    const double depth = bisection_.depth(number_, bisection_.wrapped(core_.flights().at(i, now).x));
+    if (depth <= reach) watch_over(i, holders_[i] == 0 ? quiet_at(depth) : 0);
+  }
   core_.set_border(watched_, now);
 }
 
@@ -66,7 +69,7 @@ double Ownership<D>::look_at(Slot i, double now) {
   const double depth = bisection_.depth(number_, at), reach = bisection_.reach();
   role_[i] = Role::own;
   holders_[i] = 0;
-  if (bisection_.deep(depth)) return depth - (1 + 1e-6) * reach;
+  if (bisection_.deep(depth)) return quiet_at(depth);
   double quiet;
   if (depth > 0 || bisection_.owner(at) == number_) {
     quiet = depth;

@@ -45,7 +45,7 @@ class Ownership {
   bool turn(Slot i, bool often = false) {
     const std::uint32_t k = watched_at_[i];
     if (k == kUnwatched) return false;
-    if (speed_[k] >= 0) turned_.push_back(i);
+    if (speed_[k] >= 0) turned_[turns_++] = i;
     speed_[k] = speed_[k] >= 0 && !often ? -speed_[k] : kOften;
     return true;
   }
@@ -67,12 +67,14 @@ class Ownership {
   static constexpr double kOften = -std::numeric_limits<double>::infinity();
   static constexpr std::uint32_t kUnwatched = std::numeric_limits<std::uint32_t>::max();
 
-  void watch_over(Slot i) {
+  void watch_over(Slot i, double quiet = 0) {
     watched_at_[i] = static_cast<std::uint32_t>(watched_.size());
     watched_.push_back(i);
-    quiet_.push_back(0);
-    speed_.push_back(0);
+    quiet_.push_back(quiet);
+    speed_.push_back(quiet > 0 ? speed(i) : 0);
   }
+  /// How far an own sphere that no other subdomain has can move before one may have it.
+  double quiet_at(double depth) const { return depth - (1 + 1e-6) * bisection_.reach(); }
   void enlist(Slot i, Role role);
   void forget(Slot i);
   void watch(double now);
@@ -100,7 +102,8 @@ class Ownership {
   std::vector<Slot> watched_;              // ghosts, and own spheres that may leave or become ghosts elsewhere
   std::vector<double> quiet_;              // of each: how far it may move before it must be examined again
   std::vector<double> speed_;              // of each: the largest until its next event; negated after it, then kOften
-  std::vector<Slot> turned_;               // spheres with events since sort_out()
+  std::vector<Slot> turned_;               // spheres with events since sort_out(), each once
+  std::size_t turns_ = 0;                  // their number
 };
 
 template <int D>
@@ -109,13 +112,13 @@ void Ownership<D>::sort_out(double now, double length, Send&& send) {
   if (unwatched_ += max_displacement_; unwatched_ > kWindowsBetweenSearches * max_displacement_) watch(now);
   // A sphere with one event moved at most as fast as before or after it, one with several at most max_displacement_.
   // The loop below subtracts its way at the speed after them.
-  for (const Slot i : turned_) {
+  for (const Slot i : std::span(turned_.data(), turns_)) {
     const std::uint32_t k = watched_at_[i];
     const double before = std::min(-speed_[k] * length, max_displacement_);
     speed_[k] = speed(i);
     quiet_[k] -= std::max(before - speed_[k] * length, 0.0);
   }
-  turned_.clear();
+  turns_ = 0;
   for (std::size_t k = 0; k < watched_.size(); ++k) quiet_[k] -= speed_[k] * length;
   const auto next = [&](std::size_t from) {
     const auto due = [](double quiet) { return !(quiet > 0); };

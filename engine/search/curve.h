@@ -11,12 +11,27 @@
 
 namespace carom {
 
-/// Interleaves the bits of D numbers to the index on the curve.
+/// Interleaves the lowest 21 bits of D numbers to the index on the curve.
 template <int D>
 std::uint64_t interleave(const std::array<std::uint32_t, D>& place) {
+  // Moves the bits apart by halves: bit b comes to place D·b. Of 21 bits in three dimensions, 32 in two.
+  const auto spread = [](std::uint64_t x) {
+    if constexpr (D == 3) {
+      x = (x | x << 32) & 0x001f00000000ffff;
+      x = (x | x << 16) & 0x001f0000ff0000ff;
+      x = (x | x << 8) & 0x100f00f00f00f00f;
+      x = (x | x << 4) & 0x10c30c30c30c30c3;
+      return (x | x << 2) & 0x1249249249249249;
+    } else {
+      x = (x | x << 16) & 0x0000ffff0000ffff;
+      x = (x | x << 8) & 0x00ff00ff00ff00ff;
+      x = (x | x << 4) & 0x0f0f0f0f0f0f0f0f;
+      x = (x | x << 2) & 0x3333333333333333;
+      return (x | x << 1) & 0x5555555555555555;
+    }
+  };
   std::uint64_t code = 0;
-  for (int bit = 20; bit >= 0; --bit)
-    for (int k = 0; k < D; ++k) code = code << 1 | (place[k] >> bit & 1);
+  for (int k = 0; k < D; ++k) code = code << 1 | spread(place[k]);
   return code;
 }
 
