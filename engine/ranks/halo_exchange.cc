@@ -52,8 +52,7 @@ bool HaloExchange<D>::add_ghosts(Communicator& ranks, ForceSums<D>& sums) const 
     });
     const std::vector<Bytes> incoming = ranks.complete();
     for (std::size_t k = 0; k < neighbours_.size(); ++k) {
-      std::vector<Words> taken(incoming[k].size() / sizeof(Words));
-      std::memcpy(taken.data(), incoming[k].data(), incoming[k].size());
+      const std::span taken(reinterpret_cast<const Words*>(incoming[k].data()), incoming[k].size() / sizeof(Words));
       sums.add(copied_to_[static_cast<std::size_t>(neighbours_[k])], taken, high);
     }
   }
