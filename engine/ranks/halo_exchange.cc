@@ -43,6 +43,7 @@ double HaloExchange<D>::squared_farthest(const Box<D>& box, const Particles<D>& 
 template <int D>
 bool HaloExchange<D>::add_ghosts(Communicator& ranks, ForceSums<D>& sums) const {
   using Words = typename ForceSums<D>::Words;
+  static_assert(alignof(Words) <= __STDCPP_DEFAULT_NEW_ALIGNMENT__);  // messages are read where they are
   std::array<double, 2> most = {sums.wide() ? 1.0 : 0.0, sums.has_room() ? 0.0 : 1.0};  // on any rank
   for (const bool high : {false, true}) {
     if (high && most[0] == 0) break;

@@ -71,9 +71,9 @@ class Ownership {
     watched_at_[i] = static_cast<std::uint32_t>(watched_.size());
     watched_.push_back(i);
     quiet_.push_back(quiet);
-    speed_.push_back(quiet > 0 ? speed(i) : 0);
+    speed_.push_back(speed(i));
   }
-  /// How far an own sphere that no other subdomain has can move before one may have it.
+  /// How far an own sphere that is no ghost elsewhere can move before it may become one.
   double quiet_at(double depth) const { return depth - (1 + 1e-6) * bisection_.reach(); }
   void enlist(Slot i, Role role);
   void forget(Slot i);

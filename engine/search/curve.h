@@ -14,7 +14,7 @@ namespace carom {
 /// Interleaves the lowest 21 bits of D numbers to the index on the curve.
 template <int D>
 std::uint64_t interleave(const std::array<std::uint32_t, D>& place) {
-  // Moves the bits apart by halves: bit b comes to place D·b. Of 21 bits in three dimensions, 32 in two.
+  // Bit b moves to place D·b: each line moves half of the bits of every group apart.
   const auto spread = [](std::uint64_t x) {
     if constexpr (D == 3) {
       x = (x | x << 32) & 0x001f00000000ffff;

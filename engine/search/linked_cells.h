@@ -12,7 +12,7 @@
 
 namespace carom {
 
-/// The candidates that a search found, padded with the sphere itself to a multiple of 8, and working memory.
+/// The candidates that a search found, padded with the sphere itself to a multiple of kScanLanes, and working memory.
 struct Candidates {
   Candidates() { grow(64); }
   Candidates(const Candidates&) = delete;
@@ -182,7 +182,7 @@ class LinkedCells {
   static constexpr unsigned kKinds = 2 * D - 1;         // of rows: around, and one step back or forth along an axis
   static constexpr unsigned kAround = 2 * D;            // instead of a face
   static constexpr unsigned kMostPatterns = 16;         // along an axis; rows_ has their combinations
-  static constexpr std::uint32_t kIrregular = 1 << 20;  // pattern() of cells with none of these
+  static constexpr std::uint32_t kIrregular = 1 << 20;  // at least, pattern() of cells whose pattern is not in rows_
   /// The cells to search ahead of a face, or around.
   struct Region {
     alignas(16) std::uint32_t wanted[4];  // as in CellsTask
@@ -275,7 +275,7 @@ class LinkedCells {
     for (int k = 0; k + 1 < D; ++k) pattern += step(place, k).pattern;
     return pattern;
   }
-  /// Moves a place into the next cell along an axis; whether through a face of the periodic box.
+  /// Moves a place into the next cell along an axis. Returns whether it passed through a face of the periodic box.
   bool advance(Place& place, int axis, int step) const {
     const int to = place.wrapped[axis] + step, count = grid_.count(axis);
     place.unwrapped[axis] += step;
@@ -357,7 +357,7 @@ class LinkedCells {
     make_rows(place, axis, step, found.rows);
     set(place, region, &found.rows, found.task);
   }
-  /// The cells that the next step along an axis will make neighbours, or around if `step` is 0.
+  /// Sets a task to the cells that the next step along an axis will make neighbours, or to those around if `step` is 0.
   void aim_beyond(Place place, int axis, int step, Candidates& found) const {
     if (step == 0) return aim(place, kAround, found);
     advance(place, axis, step);

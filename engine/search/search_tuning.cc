@@ -22,9 +22,9 @@ constexpr double kLargestSkin = 0.8, kSmallestSkin = 0.02, kCrowdedSkin = 0.4;  
 // diameters 1:10 took the fewest instructions at packing fractions of 0.02, 0.05 and 0.1, and discs at 0.02 to 0.35.
 constexpr double kShortList = 12;
 
-/// The packing fraction above which lists are faster, as measured for equal spheres and discs: in three dimensions both
-/// are equally fast at 0.345 with 10³ spheres and at 0.37 to 0.38 with 10⁴, in two at 0.40 with AVX2 and at 0.63 with
-/// AVX-512.
+/// The packing fraction above which lists are faster than cells, as measured for equal spheres and discs. In three
+/// dimensions, lists and cells are equally fast at 0.345 with 10³ spheres and at 0.37 with 10⁴; in two dimensions, at
+/// 0.40 with AVX2, and beyond 0.6 with AVX-512.
 double dense(int dimension) { return dimension == 2 ? 0.55 : 0.355; }
 
 /// The cells that a prediction searches; a crossing searches a third of them.
@@ -144,8 +144,8 @@ void SearchTuning::adapt_skin(const SearchSituation& s, double candidates, doubl
     const auto exponent = [](double now, double before, double ratio) {
       return elementary::log((now + 1e-9) / (before + 1e-9)) / elementary::log(ratio);
     };
-    candidates_exponent_ = std::clamp(exponent(candidates, seen_.candidates, reach / reach_before), 1.0, 4.0);
-    rebuilds_exponent_ = std::clamp(exponent(rebuilds, seen_.rebuilds, skin_ / seen_.skin), -8.0, -1.0);
+    candidates_exponent_ = std::clamp(exponent(candidates, seen_.candidates, reach / reach_before), 1.0, 10.0);
+    rebuilds_exponent_ = std::clamp(exponent(rebuilds, seen_.rebuilds, skin_ / seen_.skin), -30.0, -1.0);
   }
   seen_ = {skin_, candidates, rebuilds};
   const double most = std::max(kLargestSkin * s.mean, short_list_skin(s));
@@ -157,7 +157,8 @@ void SearchTuning::adapt_skin(const SearchSituation& s, double candidates, doubl
   double best = 1.0, least = 0.99 * cost(1.0);
   for (const double factor : {0.8, 0.9, 1.1, 1.25}) {
     const double skin = skin_ * factor;
-    if (skin <= most && skin >= kSmallestSkin * s.mean && cost(factor) < least) least = cost(factor), best = factor;
+    const bool allowed = factor < 1 ? skin >= kSmallestSkin * s.mean : skin <= most;
+    if (allowed && cost(factor) < least) least = cost(factor), best = factor;
   }
   skin_ *= best;
 }

@@ -61,12 +61,14 @@ class SearchTuning {
   SearchOptions options_;
   bool chosen_ = false, lists_ = true;
   double skin_ = 0, cell_ = 0;
-  // Exponents of candidates with the reach and of renewals with the skin. These are rough values for a dense fluid
-  // until a change of the skin has shown better ones: 1.9 and −2.0 at a packing fraction of 0.49, 3 and −1.5 at 0.33.
+  // The candidates grow as this power of the reach, and renewals as this power of the skin. These are rough values for
+  // a dense fluid, until a change of the skin has shown better ones. Measured were 1.9 and −2.0 at a packing fraction
+  // of 0.49, 3 and −1.5 at 0.33.
   double candidates_exponent_ = 2, rebuilds_exponent_ = -2.2;
+  // The skin at the last call, and the candidates and renewals per prediction with it.
   struct {
     double skin = 0, candidates = 0, rebuilds = 0;
-  } seen_;  // before the last change of the skin
+  } seen_;
   EventCounts before_;
 };
 

@@ -118,7 +118,7 @@ struct Crossing {
   unsigned face;  ///< as in NextEvent
 };
 
-/// The kernels of one vector width.
+/// The kernels of one instruction set. Those for AVX-512 also scan four candidates at once.
 struct ScanKernels {
   /// The first contact of a sphere with one of its candidates, by dimension − 2. `latest` states that no candidate's
   /// record has a later time than the sphere's.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// See scan_kernel.h. AVX-512, but four candidates at once: lists and cells have few, and with eight, collisions took 1
-// to 10 % more time (tests/benchmarks/README.md).
+// See scan_kernel.h. AVX-512 instructions, but four candidates at once: a list or a search of cells has few candidates,
+// and with eight at once collisions took more time (tests/benchmarks/README.md).
 #include "engine/search/simd/scan_kernel.h"
 
 namespace carom {

@@ -358,7 +358,6 @@ inline std::uint32_t* read_heads(const CellsTask& task, std::uint32_t& any) {
   for (; rows > 0; --rows, ++row) read(kEmpty);
   read(task.own);
   store(end, self);
-  store(end + 4, self);
   differ |= __builtin_shufflevector(differ, differ, 2, 3, 0, 1);
   any = differ[0] | differ[1];
   return end;
@@ -384,7 +383,7 @@ __attribute__((noinline)) std::uint32_t* follow(const ScanSetting& s, const Cell
     if (end == room) break;
     *end++ = link.next - box;
   }
-  for (int l = 0; l < 8; ++l) end[l] = task.self;
+  for (unsigned l = 0; l < kScanLanes; ++l) end[l] = task.self;
   return end;
 }
 

@@ -298,8 +298,9 @@ void expect_all_widths_agree(bool plain) {
       if (time < first) first = time, which = q;
     }
     const ScanTask task{0, candidates.data(), n, 0};
-    const ScanResult results[] = {scan<D, 2>(s.setting, task, false), scan<D, 4>(s.setting, task, false),
-                                  widest_kernels<ScanKernels>().scan[D - 2](s.setting, task, false)};
+    std::vector<ScanResult> results = {scan<D, 2>(s.setting, task, false), scan<D, 4>(s.setting, task, false)};
+    for (const ScanKernels* kernels : available_kernels<ScanKernels>())
+      results.push_back(kernels->scan[D - 2](s.setting, task, false));
     for (const ScanResult& result : results) {
       EXPECT_EQ(result.time, first) << n;
       if (std::isfinite(first)) {

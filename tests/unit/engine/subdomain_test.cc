@@ -160,6 +160,23 @@ TEST(Ownership, SpheresThatFallChangeTheirOwners) {
   EXPECT_NE(d.parts[0]->ownership.own(), first);
 }
 
+/// A ghost that has just been admitted may collide as often in its first window as the log allows.
+TEST(Ownership, AFreshGhostMayCollideManyTimes) {
+  const Divided d;
+  Ownership<3>& here = d.parts[0]->ownership;
+  const Flights<3>& flights = d.cores[0]->flights();
+  const auto& there = d.parts[1]->ownership;
+  const std::vector<Slot> far = there.own();  // of these, the ones that are no ghosts here
+  const auto unknown =
+      std::ranges::find_if(far, [&](Slot i) { return here.slot_of(d.cores[1]->flights()[i].id) == IdTable::kNowhere; });
+  ASSERT_NE(unknown, far.end());
+  const Record<3> r = d.cores[1]->flights()[*unknown];
+  ASSERT_TRUE(here.admit(r, 0));
+  for (std::size_t k = 0; k < 10 * flights.capacity(); ++k) EXPECT_TRUE(here.turn(here.slot_of(r.id)));
+  here.sort_out(0, 0.01, [](std::size_t, const Record<3>&) {});  // it was too far to be a ghost
+  EXPECT_EQ(here.slot_of(r.id), IdTable::kNowhere);
+}
+
 TEST(Ownership, AGhostMeetsWhatIsAsNearAsBothCanCome) {
   for (const Vec<3>& g : {Vec<3>(0, 0, 0), Vec<3>(2, -3, 6)}) {
     const Divided d(fluid(), g);
