@@ -20,12 +20,6 @@ Ownership<D>::Ownership(EventCore<D>& core, const Bisection<D>& bisection, std::
 }
 
 template <int D>
-void Ownership<D>::enlist(Slot i, Role role) {
-  slots_.add(core_.flights()[i].id, i);
-  role_[i] = role;
-}
-
-template <int D>
 void Ownership<D>::forget(Slot i) {
   role_[i] = Role::none;
   slots_.remove(core_.flights()[i].id);
@@ -43,12 +37,11 @@ std::vector<Slot> Ownership<D>::own() const {
 /// Finds the own spheres that may reach the border before the next call.
 template <int D>
 void Ownership<D>::watch(double now) {
-  unwatched_ = 0;
+  unwatched_ = 0, turns_ = 0;
   watched_.clear();
   quiet_.clear();
   speed_.clear();
   turned_.resize(role_.size());
-  turns_ = 0;
   watched_at_.assign(role_.size(), kUnwatched);
   const double reach = bisection_.reach() + (kWindowsBetweenSearches + 1) * max_displacement_;
   for (Slot i = 0; i < core_.flights().size(); ++i) {

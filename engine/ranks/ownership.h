@@ -75,7 +75,10 @@ class Ownership {
   }
   /// How far an own sphere that is no ghost elsewhere can move before it may become one.
   double quiet_at(double depth) const { return depth - (1 + 1e-6) * bisection_.reach(); }
-  void enlist(Slot i, Role role);
+  void enlist(Slot i, Role role) {
+    slots_.add(core_.flights()[i].id, i);
+    role_[i] = role;
+  }
   void forget(Slot i);
   void watch(double now);
   double look_at(Slot i, double now);
@@ -130,12 +133,8 @@ void Ownership<D>::sort_out(double now, double length, Send&& send) {
     quiet_[k] = look_at(i, now);
     if (role_[i] == Role::none) {  // the last one takes its place
       watched_at_[i] = kUnwatched;
-      watched_[k] = watched_.back();
-      quiet_[k] = quiet_.back();
-      speed_[k] = speed_.back();
-      watched_.pop_back();
-      quiet_.pop_back();
-      speed_.pop_back();
+      const auto drop = [k](auto& values) { values[k] = values.back(), values.pop_back(); };
+      drop(watched_), drop(quiet_), drop(speed_);
       if (k < watched_.size()) watched_at_[watched_[k]] = static_cast<std::uint32_t>(k);
       continue;
     }
