@@ -407,7 +407,9 @@ ScanResult search(const ScanSetting& s, CellsTask& task, bool latest) {
 
 template <int D>
 Crossing crossing(const CellFaces& faces, const double* record, const std::int32_t* cell) {
-  const Four x = load<Four>(record), v = load<Four>(record + D);
+  const Four x = load<Four>(record), at_v = load<Four>(record + D);
+  // The last double of a record in two dimensions is the id, a denormal number, by which division is slow.
+  const Four v = D == 2 ? __builtin_shufflevector(at_v, at_v, 0, 1, 0, 1) : at_v;
   const IntegerOf<Four> down = v < 0.0;
   const Four c = __builtin_convertvector(load<Width<4>::Int>(cell), Four) + (down ? Four{} : all<Four>(1));
   const Four face = load<Four>(faces.origin) + c * load<Four>(faces.edge);
