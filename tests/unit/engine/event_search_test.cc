@@ -12,12 +12,15 @@ namespace {
 /// An EventSearch without an EventCore.
 template <int D>
 struct Searched {
-  Searched(std::unique_ptr<System<D>> spheres, const Vec<D>& g, SearchOptions::Method method, double displacement = 0.1)
+  /// `elsewhere`: spheres of the system that this search does not have.
+  Searched(std::unique_ptr<System<D>> spheres, const Vec<D>& g, SearchOptions::Method method, double displacement = 0.1,
+           std::size_t elsewhere = 0)
       : system(std::move(spheres)),
         sizes(system->particles),
         flights(system->box),
         queue(flights),
         search(system->box, flights, queue, &sizes, {.method = method}) {
+    sizes.spheres += elsewhere;
     std::vector<Record<D>> records;
     const Particles<D>& p = system->particles;
     for (Id i = 0; i < p.size(); ++i) {
@@ -151,6 +154,38 @@ TEST(EventSearch, PlansAnewAfterContacts) {
     Searched<2> field(random_system<2>(30, {7, 9}, {P, W}, 0.3, 0.5, 9), Vec<2>(0, -1), method);
     expect_contacts(field, 30);
   }
+}
+
+/// Only cells near the spheres are stored, up to three beyond them. Spheres come to the outermost ones; with nine
+/// parts, these have more patterns than there are tables for.
+TEST(EventSearch, FindsContactsInScatteredParts) {
+  for (const auto method : kMethods)
+    for (const int parts : {2, 9}) {
+      auto system = random_system<3>(100, {18, 5, 5}, {P, P, P}, 0.5, 0.5, 12);
+      system->box.edges[0] = 150;
+      const auto part = [&](const Vec<3>& x) { return static_cast<int>(std::floor(x[0] * parts / 150)); };
+      for (Vec<3>& x : system->particles.x) x[0] += std::floor(x[0] * parts / 18) * 132 / parts;
+      Searched<3> s(std::move(system), Vec<3>::Zero(), method, 0.1, 500'000);
+      const double now = s.kStart, cell = 150.0 / 149;
+      for (int k = 0; k < parts; ++k) {  // the last two spheres of each part
+        std::vector<std::pair<double, Slot>> members;
+        for (Slot i = 0; i < s.flights.size(); ++i)
+          if (const Vec<3> x = s.flights.at(i, now).x; part(x) == k) members.emplace_back(x[0], i);
+        std::ranges::sort(members);
+        const Vec<3> last = s.flights.at(members.back().second, now).x + Vec<3>(3 * cell, 0, 0);
+        for (const auto& [i, away] : {std::pair(members.back().second, 0.0), {members.end()[-2].second, 1.5}}) {
+          const Record<3> r = s.flights.at(i, now);
+          s.flights.set(i, {last - Vec<3>(away, 0.3, 0), {away, 0, 0.1}, now, r.id, 0, r.species}, Spin<3>::Zero());
+          s.search.move(i, now);
+        }
+      }
+      for (Slot i = 0; i < s.flights.size(); ++i) {
+        s.search.plan(i, now);
+        s.queue.read_versions();
+      }
+      for (Slot i = 0; i < s.flights.size(); ++i) s.expect_planned(i);
+      expect_contacts(s, 10 + parts);
+    }
 }
 
 TEST(EventSearch, KnowsSpheresThatComeMoveAndGo) {
