@@ -24,7 +24,6 @@ struct Candidates {
   }
 
   CellsTask task;
-  HeadRows rows;
   std::vector<std::uint32_t> packed;
 };
 
@@ -125,7 +124,7 @@ class LinkedCells {
   void cross(Slot i, Place& place, int axis, int step) {
     remove(i, place);
     if (advance(place, axis, step)) {
-      const std::int32_t boxes = packing_.image(packing_.pack(0, place.boxes - step * one_[axis]))[axis] + step;
+      const std::int32_t boxes = (place.unwrapped[axis] - place.wrapped[axis]) / grid_.count(axis);
       if (std::abs(boxes) > packing_.largest()) throw_too_far();
       widest_ = std::max(widest_, std::abs(boxes));
     }
@@ -179,10 +178,9 @@ class LinkedCells {
   static constexpr double kCellsAParticle = 8;
   static constexpr std::int32_t kCellsAround = 3;  // margin around the cells of confine()
 
-  static constexpr unsigned kKinds = 2 * D - 1;         // of rows: around, and one step back or forth along an axis
-  static constexpr unsigned kAround = 2 * D;            // instead of a face
-  static constexpr unsigned kMostPatterns = 16;         // along an axis; rows_ has their combinations
-  static constexpr std::uint32_t kIrregular = 1 << 20;  // at least, pattern() of cells whose pattern is not in rows_
+  static constexpr unsigned kKinds = 2 * D - 1;     // of rows: around, and one step back or forth along an axis
+  static constexpr unsigned kAround = 2 * D;        // instead of a face
+  static constexpr std::size_t kMostPatterns = 32;  // along an axis, so that rows_ takes 2 MB at most
   /// The cells to search ahead of a face, or around.
   struct Region {
     alignas(16) std::uint32_t wanted[4];  // as in CellsTask
@@ -236,7 +234,7 @@ class LinkedCells {
       steps_[k].clear();
       for (std::int32_t c = -1; c <= count; ++c) {
         const std::int32_t boxes = c < 0 ? -1 : c < count ? 0 : 1;
-        steps_[k].push_back({cells * grid_.row(k, c - boxes * count), shifted(boxes * one_[k]), kIrregular});
+        steps_[k].push_back({cells * grid_.row(k, c - boxes * count), shifted(boxes * one_[k]), 0});
       }
       for (std::int32_t c = 0; c < count; ++c) {
         const auto same = [&](std::int32_t other) {
@@ -249,9 +247,12 @@ class LinkedCells {
         };
         const auto known = std::ranges::find_if(examples[k], same);
         const auto pattern = static_cast<std::uint32_t>(known - examples[k].begin());
-        if (pattern == kMostPatterns) continue;
         if (known == examples[k].end()) examples[k].push_back(c);
         steps_[k][static_cast<std::size_t>(c) + 1].pattern = combinations * pattern;
+        if (examples[k].size() > kMostPatterns) {  // too many separate parts: all cells are stored
+          grid_.spread();
+          return lay_out();
+        }
       }
       cells *= grid_.rows(k);
       combinations *= static_cast<std::uint32_t>(examples[k].size());
@@ -347,29 +348,19 @@ class LinkedCells {
   /// Sets a task to the cells ahead of a face, or around.
   void aim(const Place& place, unsigned face, Candidates& found) const {
     const Region& region = kRegions[face];
-    const unsigned at = pattern(place);
-    if (at >= kIrregular) [[unlikely]]
-      return aim_at(place, face == kAround ? D : static_cast<int>(face / 2), face % 2 == 1 ? 1 : -1, region, found);
-    set(place, region, &rows_[at + region.kind], found.task);
-  }
-  /// Sets a task to rows that are not in rows_; `axis` and `step` as in make_rows().
-  [[gnu::noinline]] void aim_at(const Place& place, int axis, int step, const Region& region, Candidates& found) const {
-    make_rows(place, axis, step, found.rows);
-    set(place, region, &found.rows, found.task);
+    CellsTask& task = found.task;
+    task.first = first_.data() + index(place) + region.shift;
+    task.rows = &rows_[pattern(place) + region.kind];
+    task.wanted = region.wanted;
+    task.link = link_.data();
+    task.away = shifted(place.boxes);
+    task.own = kEmpty;
   }
   /// Sets a task to the cells that the next step along an axis will make neighbours, or to those around if `step` is 0.
   void aim_beyond(Place place, int axis, int step, Candidates& found) const {
     if (step == 0) return aim(place, kAround, found);
     advance(place, axis, step);
     aim(place, static_cast<unsigned>(2 * axis + (step > 0 ? 1 : 0)), found);
-  }
-  void set(const Place& place, const Region& region, const HeadRows* rows, CellsTask& task) const {
-    task.first = first_.data() + index(place) + region.shift;
-    task.rows = rows;
-    task.wanted = region.wanted;
-    task.link = link_.data();
-    task.away = shifted(place.boxes);
-    task.own = kEmpty;
   }
 
   /// Executes a task; `place` is that of the sphere.

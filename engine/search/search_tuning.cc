@@ -136,8 +136,9 @@ void SearchTuning::choose_first(const SearchSituation& s) {
 }
 
 /// Scales the skin to the lowest sum of the costs of predictions, which increase with the candidates, and of renewals.
-/// Near the present skin both follow powers, whose exponents the last change of the skin has shown: they depend on the
-/// structure of the fluid, and in a crystal renewals become rare once the skin is larger than the vibrations.
+/// Near the present skin, candidates are a power of the reach and renewals a power of the skin. The exponents follow
+/// from the last two skins, because they depend on the structure of the fluid: in a crystal, renewals become rare once
+/// the skin is larger than the vibrations.
 void SearchTuning::adapt_skin(const SearchSituation& s, double candidates, double rebuilds) {
   const double reach = s.largest + 2 * skin_, reach_before = s.largest + 2 * seen_.skin;
   if (seen_.skin > 0 && std::abs(skin_ - seen_.skin) > 0.04 * seen_.skin) {

@@ -156,8 +156,8 @@ TEST(EventSearch, PlansAnewAfterContacts) {
   }
 }
 
-/// Only cells near the spheres are stored, up to three beyond them. Spheres come to the outermost ones; with nine
-/// parts, these have more patterns than there are tables for.
+/// Only cells near the spheres are stored, up to three beyond them, and spheres come to the outermost ones. With nine
+/// parts, rows of cells have too many patterns, and all cells are stored.
 TEST(EventSearch, FindsContactsInScatteredParts) {
   for (const auto method : kMethods)
     for (const int parts : {2, 9}) {
