@@ -48,7 +48,7 @@ def resize(browser, width, height):
     wait_for(browser, f"innerWidth === {width} && innerHeight === {height}")
 
 
-def wait_for(browser, condition, seconds=60):
+def wait_for(browser, condition, seconds=300):
     """Waits until an expression of JavaScript is true, and returns its value."""
     deadline = time.monotonic() + seconds
     while not (value := browser.execute_script("return " + condition)):

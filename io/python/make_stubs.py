@@ -2,13 +2,20 @@
 """Writes carom/__init__.pyi: the hints of the Python files, and a signature of add_force() and integrator() for each name.
 
     PYTHONPATH=build/release/io/python python3 -P make_stubs.py __init__.pyi
+
+The package is imported, but not used, so a stand-in replaces numpy where it is not installed (yet).
 """
 
+import importlib.util
 import inspect
 import pathlib
 import sys
+from unittest import mock
 
-from carom import _carom, simulation
+if importlib.util.find_spec("numpy") is None:
+    sys.modules["numpy"] = mock.MagicMock()
+
+from carom import _carom, simulation  # noqa: E402
 
 HEAD = '''# Generated from the declarations of the engine by io/python/make_stubs.py.
 import os

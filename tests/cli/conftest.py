@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import os
+import pathlib
 import shutil
+import subprocess
 
 import pytest
 
@@ -15,3 +17,12 @@ def browser():
         pytest.exit(f"skipped: {' and '.join(missing)} not installed; tools/test installs tools/test-packages.txt", returncode=77)
     with chromium(1000, 600) as window:
         yield window
+
+
+@pytest.fixture(scope="session")
+def killer(tmp_path_factory):
+    """The library that kills at a change of a file (kill_at_write.c)."""
+    library = tmp_path_factory.mktemp("library") / "kill_at_write.so"
+    subprocess.run(["cc", "-Wall", "-shared", "-fPIC", "-o", str(library), str(pathlib.Path(__file__).with_name("kill_at_write.c"))],
+                   check=True)
+    return library

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Kills the process at its KILL_AT-th change of a file whose path contains KILL_IN: a write (of which half is done where
 // KILL_HALF=1), a new size, a new name, a removal, a sync. Without KILL_AT the number of changes goes to KILL_COUNT, a file.
+// With KILL_ROWS only changes after this number of changes of thermo.csv count. With KILL_SIGNAL the process sends itself this
+// signal there instead of SIGKILL, then makes the change. So the place of a kill or a signal does not depend on the clock.
+// With STOP_ASLEEP the process stops itself (SIGSTOP) when it sleeps for the first time.
 // Where KILL_LOG names a file, each change is noted there, with its path, size and place; also fdatasync, which is not
 // counted: the clock decides how often the journal calls it.
 //   cc -shared -fPIC -o kill_at_write.so kill_at_write.c
@@ -12,9 +15,10 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/types.h>
+#include <time.h>
 #include <unistd.h>
 
-static long changes = 0;
+static long changes = 0, rows = 0;
 
 static void note(const char* what, const char* path, long long size, long long at) {
   const char* name = getenv("KILL_LOG");
@@ -40,10 +44,17 @@ static int concerned(const char* path) {
 /// Whether this is the change to die at.
 static int due(const char* what, const char* path, long long size, long long at) {
   const char* when = getenv("KILL_AT");
+  const char* number = getenv("KILL_SIGNAL");
+  const char* after = getenv("KILL_ROWS");
+  if (strstr(path, "/thermo.csv") != NULL) ++rows;
   if (!concerned(path)) return 0;
   note(what, path, size, at);
+  if (after != NULL && rows < atol(after)) return 0;
   ++changes;
-  return when != NULL && changes == atol(when);
+  if (when == NULL || changes != atol(when)) return 0;
+  if (number == NULL) return 1;
+  kill(getpid(), atoi(number));
+  return 0;
 }
 
 /// The path of an open file; NULL: it has none.
@@ -116,6 +127,16 @@ int fdatasync(int file) {
   if (path == NULL || !concerned(path) || getenv("KILL_LOG") == NULL) return real(file);
   note("sync", path, 0, 0);
   return 0;  // which takes no time: so the journal syncs often
+}
+
+int nanosleep(const struct timespec* time, struct timespec* rest) {
+  static int stopped = 0;
+  REAL(int, nanosleep, const struct timespec*, struct timespec*);
+  if (getenv("STOP_ASLEEP") != NULL && !stopped) {
+    stopped = 1;
+    kill(getpid(), SIGSTOP);
+  }
+  return real(time, rest);
 }
 
 #define SET_ASIDE(name, offset)                                  \

@@ -5,8 +5,10 @@ import csv
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
+import time
 
 import h5py
 import numpy as np
@@ -111,12 +113,42 @@ def mpirun(ranks, arguments, code=0, **options):
     return done
 
 
-def killer_library(directory):
-    """Builds the library that kills at a change of a file (kill_at_write.c)."""
-    library = directory / "kill_at_write.so"
-    subprocess.run(["cc", "-Wall", "-shared", "-fPIC", "-o", str(library), str(ROOT / "tests" / "cli" / "kill_at_write.c")],
-                   check=True)
-    return library
+def signalled(killer, output, number, at=1, name="thermo.csv", **more):
+    """The environment of a run that sends itself a signal at the `at`-th change of a file in its directory."""
+    more = {"LD_PRELOAD": killer, "KILL_IN": f"{output}/{name}", "KILL_AT": at, "KILL_SIGNAL": int(number)} | more
+    return mpi_environment() | {key: str(value) for key, value in more.items()}
+
+
+def running(output):
+    """The processes of the run that writes to this directory, by rank."""
+    found = {}
+    for process in pathlib.Path("/proc").glob("[0-9]*"):
+        try:
+            arguments = (process / "cmdline").read_bytes().split(b"\0")
+            rank = re.search(rb"(?:^|\0)OMPI_COMM_WORLD_RANK=(\d+)", (process / "environ").read_bytes())
+        except OSError:  # it has just ended, or belongs to another user
+            continue
+        if rank and str(output).encode() in arguments and arguments[0] == CAROM.encode():
+            found[int(rank[1])] = int(process.name)
+    return found
+
+
+def wait_until_stopped(job, process=None):
+    """Waits until a process of a job, the job itself by default, has stopped itself."""
+    while pathlib.Path(f"/proc/{process or job.pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "T":
+        assert job.poll() is None
+        time.sleep(0.005)
+
+
+def wait_until_computed(job, seconds):
+    """Waits until a process has computed for so many more seconds of processor time."""
+    def computed():
+        times = pathlib.Path(f"/proc/{job.pid}/stat").read_text().rsplit(")", 1)[1].split()[11:13]
+        return sum(map(int, times)) / os.sysconf("SC_CLK_TCK")
+    end = computed() + seconds
+    while computed() < end:
+        assert job.poll() is None
+        time.sleep(0.01)
 
 
 def write_deck(directory, text):

@@ -9,8 +9,8 @@ import subprocess
 import numpy as np
 import pytest
 
-from going_on import INTERRUPTED, box, expect_same, go_on, wait_for_rows
-from runs import CAROM, command, data_sets, mpi_environment, mpirun, needs_carom, run, summary, thermo, write_deck
+from going_on import INTERRUPTED, box, expect_same, go_on
+from runs import CAROM, command, data_sets, mpi_environment, mpirun, needs_carom, needs_compiler, run, signalled, summary, thermo, write_deck
 from test_continue import CASES, spheres
 
 pytestmark = needs_carom
@@ -76,16 +76,14 @@ def test_without_a_change_the_bits_are_those_of_the_run(method, more, dimension,
     assert account["energy"]["initial"] == table_rows(out)[0]["total"]
 
 
+@needs_compiler
 @pytest.mark.parametrize("after", [1, 2])
-def test_within_an_epoch(after, tmp_path):
+def test_within_an_epoch(after, killer, tmp_path):
     text = spheres(tmp_path, 700000, step=60.0).read_text()
     deck, whole, out, later = write_deck(tmp_path, text + "events = true\n"), *(tmp_path / name for name in ("whole", "out", "later"))
     run(deck, whole)
     assert summary(whole)["steps"] > 1
-    job = subprocess.Popen(command(deck, out), stderr=subprocess.PIPE, text=True)
-    wait_for_rows(job, out)
-    job.send_signal(signal.SIGUSR2)
-    assert job.wait(60) == INTERRUPTED, job.stderr.read()
+    run(deck, out, env=signalled(killer, out, signal.SIGUSR2, 5), code=INTERRUPTED)
     step = summary(out)["steps"]
     last = summary(whole)["steps"] - 1  # the end of an epoch
     assert step < last

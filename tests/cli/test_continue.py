@@ -2,7 +2,6 @@
 """`carom run --continue`: after any interruption, the final files are those of an undisturbed run, bit for bit."""
 
 import os
-import pathlib
 import re
 import shlex
 import shutil
@@ -13,8 +12,8 @@ import time
 import pytest
 
 from going_on import ALL_OUTPUT, CHECKPOINTS, INTERRUPTED, box, compare, expect_same, go_on, toml_text, wait_for_rows
-from runs import (CAROM, ROOT, SPHERES, SPRINGS, command, mpi_environment, mpirun, needs_carom, run, summary,
-                  thermo, write_deck)
+from runs import (CAROM, ROOT, SPHERES, SPRINGS, command, mpi_environment, mpirun, needs_carom, needs_compiler, run, signalled,
+                  summary, thermo, wait_until_stopped, write_deck)
 
 pytestmark = needs_carom
 
@@ -48,12 +47,17 @@ def test_twice_half_a_run_is_a_whole_one(method, more, dimension, before, after,
         tmp_path / "halves" / "deck.toml").read_text()
 
 
-def test_the_time_of_both_parts_counts(tmp_path):
-    deck = write_deck(tmp_path, box("psa", 3, 200))
-    run(deck, tmp_path / "parts", ["run.steps=199"])
-    first = summary(tmp_path / "parts")
-    go_on(tmp_path / "parts", ["--set", "run.steps=200"])
-    assert summary(tmp_path / "parts")["wall_seconds"] > 0.5 * first["wall_seconds"]
+@needs_compiler
+def test_the_time_of_both_parts_counts(killer, tmp_path):
+    """The first part of the run is stopped for half a second."""
+    deck, out = write_deck(tmp_path, box("psa", 3, 200)), tmp_path / "parts"
+    job = subprocess.Popen(command(deck, out, ["run.steps=199"]), env=signalled(killer, out, signal.SIGSTOP, 5))
+    wait_until_stopped(job)
+    time.sleep(0.5)
+    job.send_signal(signal.SIGCONT)
+    assert job.wait() == 0
+    go_on(out, ["--set", "run.steps=200"])
+    assert summary(out)["wall_seconds"] > 0.5
 
 
 def test_warnings_and_the_last_collision_are_kept(tmp_path):
@@ -110,111 +114,97 @@ def spheres(tmp_path, collisions, step=200.0):
     return write_deck(tmp_path, text)
 
 
+@needs_compiler
 @pytest.mark.parametrize("before, after", [(1, 1), (1, 2), (2, 1)])
-def test_within_an_epoch(before, after, tmp_path):
+def test_within_an_epoch(before, after, killer, tmp_path):
     deck, whole, out = spheres(tmp_path, 600000), tmp_path / "whole", tmp_path / "out"
     run(deck, whole)
     assert summary(whole)["steps"] == 1
     launcher = ["mpirun", "-n", str(before)] if before > 1 else []
-    job = subprocess.Popen(launcher + command(deck, out), env=mpi_environment(), stderr=subprocess.PIPE, text=True)
-    wait_for_rows(job, out)
-    job.send_signal(signal.SIGUSR2)
-    assert job.wait(60) == INTERRUPTED, job.stderr.read()
+    done = subprocess.run(launcher + command(deck, out), env=signalled(killer, out, signal.SIGUSR2, 5), capture_output=True, text=True)
+    assert done.returncode == INTERRUPTED, done.stderr
     assert summary(out)["status"] == "interrupted" and summary(out)["steps"] == 0
     go_on(out, ranks=after)
     expect_same(whole, out)
 
 
-@pytest.mark.parametrize("number", ["TERM", "INT", "HUP", "USR2", "USR1"])
-def test_signals(number, tmp_path):
+@needs_compiler
+@pytest.mark.parametrize("name", ["TERM", "INT", "HUP", "USR2", "USR1"])
+def test_signals(name, killer, tmp_path):
     deck, out = spheres(tmp_path, 2500000), tmp_path / "out"
-    job = subprocess.Popen(command(deck, out), stderr=subprocess.PIPE, text=True)
-    wait_for_rows(job, out)
-    assert not (out / "checkpoint.h5").exists()
-    start = time.monotonic()
-    job.send_signal(getattr(signal, "SIG" + number))
-    if number == "USR1":  # writes a checkpoint and continues
-        while not (out / "checkpoint.h5").exists():
-            assert job.poll() is None
-        assert job.wait(60) == 0
-        assert (out / "checkpoint.previous.h5").exists()  # and another one at the end
-        return
-    assert job.wait(60) == INTERRUPTED
-    assert time.monotonic() - start < 10
+    done = subprocess.run(command(deck, out), env=signalled(killer, out, getattr(signal, "SIG" + name), 5), capture_output=True, text=True)
     assert (out / "checkpoint.h5").exists() and not (out / "carom.lock").exists()
-    assert f"stopped by SIG{number}; carom run --continue {out} goes on" in (out / "run.log").read_text()
+    assert (out / "checkpoint.previous.h5").exists() == (name == "USR1")  # after which the run continues, and writes another one at its end
+    assert done.returncode == (0 if name == "USR1" else INTERRUPTED), done.stderr
+    assert summary(out)["status"] == ("done" if name == "USR1" else "interrupted")
+    assert (f"stopped by SIG{name}; carom run --continue {out} goes on" in (out / "run.log").read_text()) == (name != "USR1")
+
+
+@pytest.mark.parametrize("ends", [True, False])
+def test_signals_to_mpirun(ends, tmp_path):
+    """A run without end gets USR1, writes a checkpoint and goes on, and ends after USR2."""
+    deck, out = spheres(tmp_path, 10**12), tmp_path / "out"
+    job = subprocess.Popen(["mpirun", "-n", "2", *command(deck, out)], env=mpi_environment(), stderr=subprocess.PIPE, text=True)
+    wait_for_rows(job, out)
+    if not ends:
+        job.send_signal(signal.SIGUSR1)
+        while not (out / "checkpoint.h5").exists():
+            assert job.poll() is None, job.stderr.read()
+            time.sleep(0.01)
+    job.send_signal(signal.SIGUSR2)
+    assert job.wait(60) == INTERRUPTED, job.stderr.read()
+    assert (out / "checkpoint.h5").exists() and (out / "checkpoint.previous.h5").exists() == (not ends)
     assert summary(out)["status"] == "interrupted"
 
 
-@pytest.mark.parametrize("number, code", [("USR2", INTERRUPTED), ("USR1", 0)])
-def test_signals_to_mpirun(number, code, tmp_path):
-    deck, out = spheres(tmp_path, 900000), tmp_path / "out"
-    job = subprocess.Popen(["mpirun", "-n", "2", *command(deck, out)], env=mpi_environment(), stderr=subprocess.PIPE, text=True)
-    wait_for_rows(job, out)
-    job.send_signal(getattr(signal, "SIG" + number))
-    assert job.wait(60) == code, job.stderr.read()
-    assert (out / "checkpoint.h5").exists()
-    assert summary(out)["status"] == {0: "done", INTERRUPTED: "interrupted"}[code]
-
-
-def catches(process, number):
-    """Whether a process handles a signal itself."""
-    for line in pathlib.Path(f"/proc/{process}/status").read_text().splitlines():
-        if line.startswith("SigCgt:"):
-            return bool(int(line.split()[1], 16) >> (number - 1) & 1)
-
-
-def test_a_second_interrupt_ends_at_once(tmp_path):
-    """Sends a second signal while a large checkpoint, due to the first one, is being written."""
+@needs_compiler
+def test_a_second_interrupt_ends_at_once(killer, tmp_path):
+    """The process gets a second signal while it writes the checkpoint that is due to the first one."""
     out = tmp_path / "out"
-    job = subprocess.Popen(command(write_deck(tmp_path, SPHERES), out, ["particles.0.count=108000", "run.end_time=100.0"]),
-                           stderr=subprocess.PIPE, text=True)
+    job = subprocess.Popen(command(write_deck(tmp_path, SPHERES), out, ["run.end_time=1e7"]), stderr=subprocess.PIPE, text=True,
+                           env=signalled(killer, out, signal.SIGSTOP, name="checkpoint.h5"))
     wait_for_rows(job, out, 1)
     job.send_signal(signal.SIGINT)
-    while catches(job.pid, signal.SIGINT):
-        assert job.poll() is None
+    wait_until_stopped(job)
     job.send_signal(signal.SIGINT)
+    job.send_signal(signal.SIGCONT)
     assert job.wait(60) == -signal.SIGINT
+    assert not (out / "checkpoint.h5").exists()
 
 
 def test_max_wall_again_and_again(tmp_path):
-    """A run is continued with a wall time limit, on different numbers of ranks, until exit code 0."""
-    deck, whole, out = write_deck(tmp_path, box("edda", 3, 2000)), tmp_path / "whole", tmp_path / "out"
-    run(deck, whole, ALL_OUTPUT)
-    run(deck, out, ALL_OUTPUT, arguments=("--quiet", "--max-wall", "0.05"), code=INTERRUPTED)
-    pieces = 0
-    for pieces in range(40):
-        ranks = 2 if pieces == 1 else 1
-        wall = ["--max-wall", f"{0.2 * (1 + pieces):.1f}"]  # part of this is for the start
-        done = subprocess.run((["mpirun", "-n", "2"] if ranks > 1 else []) + [CAROM, "run", "--continue", str(out), "--quiet", *wall],
-                              env=mpi_environment(), capture_output=True, text=True, timeout=60)
-        if done.returncode == 0:
-            break
-        assert done.returncode == INTERRUPTED, done.stderr
-    assert pieces > 1
+    """A run without end is continued with a wall time limit on different numbers of ranks, and then comes to an end."""
+    deck, whole, out = write_deck(tmp_path, box("edda", 3, 10**9)), tmp_path / "whole", tmp_path / "out"
+    run(deck, out, ALL_OUTPUT, arguments=("--quiet", "--max-wall", "0.1"), code=INTERRUPTED)
+    for ranks in (1, 2, 1):
+        go_on(out, ["--max-wall", "0.3"], code=INTERRUPTED, ranks=ranks)
+    end = f"run.steps={summary(out)['steps'] + 10}"
+    run(deck, whole, [*ALL_OUTPUT, end])
+    go_on(out, ["--set", end])
     expect_same(whole, out)
 
 
 def test_the_script_for_slurm(tmp_path):
     """With stand-ins for Slurm and mpirun: it asks to be queued again until the run is done, but not where it was cancelled."""
-    deck, whole, out, queue = spheres(tmp_path, 2500000), tmp_path / "whole", tmp_path / "out", tmp_path / "queue"
-    run(deck, whole)
+    deck, whole, out, queue = spheres(tmp_path, 10**12), tmp_path / "whole", tmp_path / "out", tmp_path / "queue"
     for name, text in {"mpirun": 'exec "$@"', "scontrol": f'echo "$@" >>{queue}', "sbatch": f'echo "$@" >>{queue}'}.items():
         (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")
         (tmp_path / name).chmod(0o755)
     environment = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}", "SLURM_JOB_ID": "17"}
     script = ROOT / "tools" / "slurm-run"
-    for number, code, queued in [(signal.SIGUSR2, 0, 1), (signal.SIGTERM, INTERRUPTED, 1), (None, 0, 1)]:
-        before = (out / "run.log").read_text().count("continued") if out.exists() else 0
+    for number, code, continued in [(signal.SIGUSR2, 0, 0), (signal.SIGTERM, INTERRUPTED, 1)]:
         job = subprocess.Popen([script, deck, out], env=environment, stderr=subprocess.PIPE, text=True)
-        if before == 0 and number == signal.SIGUSR2:
-            wait_for_rows(job, out)
-        while number == signal.SIGTERM and (out / "run.log").read_text().count("continued") == before:
+        wait_for_rows(job, out)
+        while (out / "run.log").read_text().count("continued") < continued:
             assert job.poll() is None
-        if number is not None:
-            job.send_signal(number)
+        job.send_signal(number)
         assert job.wait(60) == code, job.stderr.read()
-        assert queue.read_text().count("requeue 17\n") == queued
+        assert queue.read_text().count("requeue 17\n") == 1
+    end = f"run.collisions={summary(out)['events']['sphere_sphere'] + 1000}"
+    go_on(out, ["--set", end])
+    subprocess.run([script, deck, out], env=environment, check=True)
+    assert queue.read_text().count("requeue 17\n") == 1
+    run(deck, whole, [end])
     expect_same(whole, out)
     subprocess.run([script, "deck", "there", "--nodes=2"], env={k: v for k, v in environment.items() if k != "SLURM_JOB_ID"}, check=True)
     assert queue.read_text().endswith(f"--nodes=2 {script} deck there\n")
@@ -265,12 +255,10 @@ def test_an_end_that_lies_behind_is_refused(tmp_path):
     assert summary(tmp_path / "done-earlier")["steps"] == 30
 
 
-def test_an_end_that_lies_behind_within_an_epoch(tmp_path):
+@needs_compiler
+def test_an_end_that_lies_behind_within_an_epoch(killer, tmp_path):
     deck, out, whole = spheres(tmp_path, 4000000), tmp_path / "out", tmp_path / "whole"
-    job = subprocess.Popen(command(deck, out), stderr=subprocess.PIPE, text=True)
-    wait_for_rows(job, out)
-    job.send_signal(signal.SIGUSR2)
-    assert job.wait(60) == INTERRUPTED, job.stderr.read()
+    run(deck, out, env=signalled(killer, out, signal.SIGUSR2, 5), code=INTERRUPTED)
     before, collisions = contents(out), summary(out)["events"]["sphere_sphere"]
     assert summary(out)["steps"] == 0
     refused = go_on(out, ["--set", "run.end_time=1.0"], code=2).stderr

@@ -14,7 +14,7 @@ import time
 import numpy as np
 import pytest
 
-from runs import CAROM, ROOT, SPHERES, command, data_sets, killer_library, needs_carom, needs_compiler, run, write_deck
+from runs import CAROM, ROOT, SPHERES, command, data_sets, needs_carom, needs_compiler, run, write_deck
 
 sys.path.insert(0, str(ROOT / "tools"))
 
@@ -39,11 +39,6 @@ def deck(directory):
     """A deck that writes every kind of file."""
     text = SPHERES.replace("end_time = 3.0", "end_time = 0.5").replace("frame_interval = 0.5", f"frame_interval = {FRAME_INTERVAL}")
     return write_deck(directory, text.replace("thermo_interval = 0.1", "thermo_interval = 0.05\nevents = true\nrdf_interval = 0.1"))
-
-
-@pytest.fixture(scope="module")
-def killer(tmp_path_factory):
-    return killer_library(tmp_path_factory.mktemp("library"))
 
 
 def killed_run(killer, directory, at=None, half=False):

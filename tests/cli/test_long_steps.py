@@ -8,7 +8,7 @@ import time
 import pytest
 
 from going_on import INTERRUPTED, expect_same, go_on, wait_for_rows
-from runs import command, mpi_environment, needs_carom, run, summary, write_deck
+from runs import command, mpi_environment, needs_carom, run, summary, wait_until_computed, write_deck
 
 pytestmark = needs_carom
 
@@ -77,9 +77,9 @@ def test_signals(method, number, tmp_path):
     out = tmp_path / "out"
     job = subprocess.Popen(command(deck_of(tmp_path, method), out, ENDLESS), stderr=subprocess.PIPE, text=True)
     wait_for_rows(job, out, 1)
-    time.sleep(0.2)
+    wait_until_computed(job, 0.1)
     job.send_signal(getattr(signal, "SIG" + number))
-    assert job.wait(30) == INTERRUPTED, job.stderr.read()
+    assert job.wait(60) == INTERRUPTED, job.stderr.read()
     expect_interrupted(out)
 
 
@@ -91,7 +91,7 @@ def test_signals_to_mpirun(method, tmp_path):
     wait_for_rows(job, out, 1)
     time.sleep(0.2)
     job.send_signal(signal.SIGUSR2)
-    assert job.wait(30) == INTERRUPTED, job.stderr.read()
+    assert job.wait(60) == INTERRUPTED, job.stderr.read()
     expect_interrupted(out)
 
 
@@ -99,22 +99,27 @@ def test_signals_to_mpirun(method, tmp_path):
 def test_going_on_from_within_a_step(method, before, after, tmp_path):
     whole, out = tmp_path / "whole", tmp_path / "out"
     deck = deck_of(tmp_path, method, STIFF if method == "edda" else JAMMED)
-    overrides = [f"integrator.step={ {'cva': 0.003, 'cdda': 0.0005, 'edda': 0.05}[method] }", "run.steps=2"]
-    run(deck, whole, overrides)
+    overrides = [f"integrator.step={ {'cva': 0.003, 'cdda': 0.0005, 'edda': 0.05}[method] }"]
     launcher = ["mpirun", "-n", str(before)] if before > 1 else []
-    job = subprocess.Popen(launcher + command(deck, out, overrides), env=mpi_environment(), stderr=subprocess.PIPE, text=True)
+    job = subprocess.Popen(launcher + command(deck, out, [*overrides, "run.steps=1000000"]), env=mpi_environment(), stderr=subprocess.PIPE, text=True)
     wait_for_rows(job, out, 1)
     job.send_signal(signal.SIGUSR2)
-    assert job.wait(30) == INTERRUPTED, job.stderr.read()
-    assert summary(out)["steps"] < 2
-    go_on(out, ranks=after)
+    assert job.wait(60) == INTERRUPTED, job.stderr.read()
+    end = f"run.steps={summary(out)['steps'] + 1}"
+    run(deck, whole, [*overrides, end])
+    go_on(out, ["--set", end], ranks=after)
     expect_same(whole, out)
 
 
 def test_a_checkpoint_waits_for_the_end_of_the_step(tmp_path):
+    """USR1 comes within a step without end, which USR2 abandons."""
     out = tmp_path / "out"
-    job = subprocess.Popen(command(deck_of(tmp_path, "cva"), out, ["run.steps=2"]), stderr=subprocess.PIPE, text=True)
+    job = subprocess.Popen(command(deck_of(tmp_path, "cva"), out, ENDLESS), stderr=subprocess.PIPE, text=True)
     wait_for_rows(job, out, 1)
+    wait_until_computed(job, 0.2)
     job.send_signal(signal.SIGUSR1)
-    assert job.wait(30) == 0, job.stderr.read()
-    assert (out / "checkpoint.previous.h5").exists()  # and another one at the end
+    wait_until_computed(job, 0.2)
+    assert not (out / "checkpoint.h5").exists()
+    job.send_signal(signal.SIGUSR2)
+    assert job.wait(60) == INTERRUPTED, job.stderr.read()
+    assert (out / "checkpoint.h5").exists() and not (out / "checkpoint.previous.h5").exists()

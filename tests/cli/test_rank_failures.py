@@ -14,7 +14,7 @@ import time
 import pytest
 
 from runs import (CAROM, MPIRUN, ROOT, SPHERES, SPRINGS, command, data_sets, frames_are_sound, mpi_environment, mpirun, needs_carom,
-                  needs_compiler, run, summary, thermo, write_deck)
+                  needs_compiler, run, running, summary, thermo, write_deck)
 
 sys.path.insert(0, str(ROOT / "tools"))
 from carom_files import toml_text
@@ -30,23 +30,9 @@ def start(ranks, arguments):
                             stderr=subprocess.PIPE, text=True)
 
 
-def running(output):
-    """The processes of the run that writes to this directory, by rank."""
-    found = {}
-    for process in pathlib.Path("/proc").glob("[0-9]*"):
-        try:
-            arguments = (process / "cmdline").read_bytes().split(b"\0")
-            rank = re.search(rb"(?:^|\0)OMPI_COMM_WORLD_RANK=(\d+)", (process / "environ").read_bytes())
-        except OSError:  # it has just ended, or belongs to another user
-            continue
-        if rank and str(output).encode() in arguments and arguments[0] == CAROM.encode():
-            found[int(rank[1])] = int(process.name)
-    return found
-
-
 def when_it_has_ended(output):
     """mpirun does not wait for processes that it kills."""
-    for _ in range(1000):
+    for _ in range(6000):
         if not running(output):
             return
         time.sleep(0.01)

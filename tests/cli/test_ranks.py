@@ -12,7 +12,7 @@ import tomllib
 import pytest
 
 from going_on import go_on
-from runs import CAROM, ROOT, ROUGH, SPHERES, SPRINGS, command, killer_library, mpirun, needs_carom, run, summary, write_deck
+from runs import CAROM, ROOT, ROUGH, SPHERES, SPRINGS, command, mpirun, needs_carom, run, signalled, summary, thermo, write_deck
 
 sys.path.insert(0, str(ROOT / "tools"))
 import compare
@@ -60,13 +60,12 @@ WIDTHS = [width for width, flag in (("sse2", "sse2"), ("avx2", "avx2"), ("avx512
 
 @pytest.mark.parametrize("method, bath", [(method, "andersen") for method in ("free-flight", "psa", "edda", "cva", "mcva", "cdda")] +
                          [(method, "rescaling") for method in ("free-flight", "psa", "edda")])
-def test_every_law_on_ranks_at_all_vector_widths_and_after_a_kill(method, bath, tmp_path):
+def test_every_law_on_ranks_at_all_vector_widths_and_after_a_kill(method, bath, killer, tmp_path):
     heated = LAWS | {"bath": [{"type": bath, "temperature": [1.0, 2.0], "rate": 0.5}]}
     deck, plain, killed = write_deck(tmp_path, toml_text(heated)), tmp_path / "plain", tmp_path / "killed"
     output = ["output.events=true", "output.checkpoint_wall=\"0\"", f"integrator.type={method}",
               "integrator.step=" + ("0.25" if method == "free-flight" else "0.02")]
-    library = {"LD_PRELOAD": str(killer_library(tmp_path)), "KILL_IN": f"{plain}/", "KILL_COUNT": str(tmp_path / "changes")}
-    run(deck, plain, output, env=os.environ | library)
+    run(deck, plain, output)
     energy = summary(plain)["energy"]
     assert energy["dissipated"] > 1 and abs(energy["work"]) > 1 and abs(energy["heat"]) > 1 and energy["rotational"] > 1
     if method in ("free-flight", "edda", "cdda"):
@@ -78,8 +77,7 @@ def test_every_law_on_ranks_at_all_vector_widths_and_after_a_kill(method, bath, 
     for width in WIDTHS[:-1]:
         run(deck, tmp_path / width, output, env=os.environ | {"CAROM_SIMD": width})
         assert differences(plain, tmp_path / width) == []
-    at = {"KILL_IN": f"{killed}/", "KILL_AT": str(int((tmp_path / "changes").read_text()) // 2)}
-    run(deck, killed, output, env=os.environ | library | at, code=-signal.SIGKILL)
+    run(deck, killed, output, env=signalled(killer, killed, signal.SIGKILL, len(thermo(plain)["time"]) // 2), code=-signal.SIGKILL)
     go_on(killed, ranks=2)
     assert differences(plain, killed) == []
     assert filecmp.cmp(plain / "thermo.csv", killed / "thermo.csv", shallow=False)
@@ -189,7 +187,7 @@ def test_the_fluxes_of_an_ewald_sum_are_shared(tmp_path):
 
 
 @pytest.mark.parametrize("method", ["free-flight", "edda"])
-def test_an_equilibrated_run_on_ranks_and_after_a_kill(method, tmp_path):
+def test_an_equilibrated_run_on_ranks_and_after_a_kill(method, killer, tmp_path):
     deck = ROOT / "inputs" / ("yukawa-fluid.toml" if method == "edda" else "hard-sphere-fluid.toml")
     plain, killed = tmp_path / "plain", tmp_path / "killed"
     output = ["particles.0.count=108", "output.start=\"equilibrated\"", "output.frame_interval=0",
@@ -197,8 +195,7 @@ def test_an_equilibrated_run_on_ranks_and_after_a_kill(method, tmp_path):
               "output.transport_interval=0.08", "output.pressure_tensor_interval=0.05",
               *(["integrator.step=0.04", "run.end_time=5.6", "output.thermo_interval=0.04", "interaction.0.cutoff=2.0"] if method == "edda"
                 else ["integrator.step=0.2", "output.thermo_interval=0.03", "run.end_time=6"])]
-    library = {"LD_PRELOAD": str(killer_library(tmp_path)), "KILL_IN": f"{plain}/", "KILL_COUNT": str(tmp_path / "changes")}
-    run(deck, plain, output, env=os.environ | library)
+    run(deck, plain, output)
     found = summary(plain)["equilibration"]
     assert 0 < found["transient_end"] <= found["start"] / 2 + 0.25 and 3 <= found["start"] < 5.5
     assert summary(plain)["means"]["pressure"]["standard_error"] > 0
@@ -206,8 +203,8 @@ def test_an_equilibrated_run_on_ranks_and_after_a_kill(method, tmp_path):
     mpirun(2, command(deck, tmp_path / "two", output))
     assert differences(plain, tmp_path / "two") == []
     for part in 0.2, 0.7:  # before and after the end of the transient
-        at = {"KILL_IN": f"{killed}/", "KILL_AT": str(int(part * int((tmp_path / "changes").read_text())))}
-        run(deck, killed, output, env=os.environ | library | at, code=-signal.SIGKILL)
+        row = int(part * len(thermo(plain)["time"]))
+        run(deck, killed, output, env=signalled(killer, killed, signal.SIGKILL, row), code=-signal.SIGKILL)
         go_on(killed, ranks=2 if method == "free-flight" else 1)
         assert differences(plain, killed) == []
 

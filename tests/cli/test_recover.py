@@ -12,20 +12,15 @@ import time
 import pytest
 
 from going_on import ALL_OUTPUT, CHECKPOINTS, box, compare, expect_same, go_on, summary_differences
-from runs import (CAROM, SPHERES, SPRINGS, command, in_mount, killer_library, mpi_environment, needs_carom, needs_compiler,
-                  needs_mount, run, summary, write_deck)
+from runs import (CAROM, SPHERES, SPRINGS, command, in_mount, mpi_environment, needs_carom, needs_compiler,
+                  needs_mount, run, summary, thermo, wait_until_stopped, write_deck)
 
 pytestmark = needs_carom
 
 
-@pytest.fixture(scope="module")
-def killer(tmp_path_factory):
-    return killer_library(tmp_path_factory.mktemp("library"))
-
-
-def killed(killer, deck, out, at, overrides, go=False, where=""):
-    """Runs and dies at a change of its files (None: counts the changes); returns whether it died."""
-    environment = os.environ | {"LD_PRELOAD": str(killer), "KILL_IN": f"{out}/{where}", "KILL_HALF": str((at or 0) % 2)}
+def killed(killer, deck, out, at, overrides, go=False, where="", rows=0):
+    """Runs and dies at a change of its files after so many rows (None: counts the changes); returns whether it died."""
+    environment = os.environ | {"LD_PRELOAD": str(killer), "KILL_IN": f"{out}/{where}", "KILL_HALF": str((at or 0) % 2), "KILL_ROWS": str(rows)}
     environment |= {"KILL_AT": str(at)} if at else {"KILL_COUNT": str(out.parent / "count")}
     what = [CAROM, "run", "--continue", str(out), "--quiet"] if go else command(deck, out, overrides)
     done = subprocess.run(what, env=environment, capture_output=True, text=True, timeout=60)
@@ -36,19 +31,22 @@ def killed(killer, deck, out, at, overrides, go=False, where=""):
 @needs_compiler
 @pytest.mark.parametrize("method", ["free-flight", "psa"])
 def test_killed_at_its_writes(method, killer, tmp_path):
-    """Kills a run also while it writes checkpoints, and while it is being continued. CAROM_KILLS sets the number of kills."""
+    """Kills a run also while it writes checkpoints, and while it is being continued. CAROM_KILLS sets the number of kills.
+
+    The clock decides how many checkpoints a run writes, but each has one before its second row and one at its end. So the place
+    of a kill is counted in rows, or in changes of the files of two checkpoints."""
     dice, kills = random.Random(7), int(os.environ.get("CAROM_KILLS", "12"))
     deck, whole, out = write_deck(tmp_path, box(method, 3, 200 if method == "psa" else 60)), tmp_path / "whole", tmp_path / "out"
     run(deck, whole, ALL_OUTPUT)
-    killed(killer, deck, out, None, ALL_OUTPUT + CHECKPOINTS)
-    changes, refused, continued = int((tmp_path / "count").read_text()), 0, 0
-    assert changes > 200
+    rows = len(thermo(whole)["time"])
+    killed(killer, deck, out, None, ALL_OUTPUT, where="checkpoint.h5")
+    of_a_checkpoint, refused, continued = int((tmp_path / "count").read_text()), 0, 0
+    assert rows > 40 and of_a_checkpoint > 4
     for n in range(kills):
         shutil.rmtree(out)
-        checkpoints = n % 2 == 1
-        where, most = ("checkpoint.h5", 40) if checkpoints else ("", changes)
-        if not killed(killer, deck, out, dice.randrange(1, most), ALL_OUTPUT + CHECKPOINTS, where=where):
-            continue
+        where, at, row = (("checkpoint.h5", dice.randrange(1, 2 * of_a_checkpoint), 0) if n % 2 == 1 else
+                          ("", dice.randrange(1, 6), dice.randrange(0, rows - 6)))
+        assert killed(killer, deck, out, at, ALL_OUTPUT + CHECKPOINTS, where=where, rows=row)
         if not (out / "checkpoint.h5").exists() and not (out / "checkpoint.previous.h5").exists():
             # There may be files or none yet.
             assert "there is no checkpoint.h5 to go on from" in go_on(out, code=5).stderr
@@ -155,7 +153,8 @@ def test_a_damaged_slot_and_kills(killer, tmp_path):
     assert deaths > 4
 
 
-def test_the_checkpoint_is_read_when_the_directory_is_free(tmp_path):
+@needs_compiler
+def test_the_checkpoint_is_read_when_the_directory_is_free(killer, tmp_path):
     """A process that is ending may write another checkpoint meanwhile."""
     whole, out = interrupted(tmp_path)
     earlier = tmp_path / "earlier"
@@ -164,11 +163,13 @@ def test_the_checkpoint_is_read_when_the_directory_is_free(tmp_path):
     (out / "checkpoint.h5").write_bytes((earlier / "checkpoint.h5").read_bytes())
     owner = subprocess.Popen(["sleep", "60"])
     lock_of(out, owner.pid)
-    job = subprocess.Popen([CAROM, "run", "--continue", str(out), "--set", "run.steps=300"], stdout=subprocess.PIPE, text=True)
-    time.sleep(0.7)  # it waits up to two seconds for a process to end
+    job = subprocess.Popen([CAROM, "run", "--continue", str(out), "--set", "run.steps=300"], stdout=subprocess.PIPE, text=True,
+                           env=os.environ | {"LD_PRELOAD": str(killer), "STOP_ASLEEP": "1"})
+    wait_until_stopped(job)  # it waits for the owner to end
     (out / "checkpoint.h5").write_bytes(late)
     owner.kill()
     owner.wait()
+    job.send_signal(signal.SIGCONT)
     assert "continued at step 200" in job.communicate()[0] and job.returncode == 0
     expect_same(whole, out)
 

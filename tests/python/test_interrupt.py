@@ -2,6 +2,7 @@
 """Ctrl-C: a real signal to a real process."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -28,6 +29,11 @@ except KeyboardInterrupt:
 """
 
 
+def processor_seconds(process):
+    with open(f"/proc/{process.pid}/stat") as file:
+        return sum(map(int, file.read().rsplit(")", 1)[1].split()[11:13])) / os.sysconf("SC_CLK_TCK")
+
+
 @pytest.mark.parametrize("make, ahead, more", [
     ("five_springs()", 1.005, ""), ("gas()", 10.0, ""), ("gas(4096, step=1000)", 10.0, ""),
     ("five_springs()", 1.0, ", every=0.05, callback=lambda s: s.energy")])
@@ -36,7 +42,9 @@ def test_ctrl_c_ends_the_step_and_the_run_goes_on(make, ahead, more):
     script = SCRIPT.format(here=str(pathlib.Path(__file__).parent), make=make, more=more, ahead=ahead)
     with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout.readline() == "ready\n"
-        time.sleep(0.3)
+        start = processor_seconds(process)
+        while processor_seconds(process) < start + 0.2:
+            time.sleep(0.01)
         process.send_signal(signal.SIGINT)
         said = json.loads(process.stdout.readline())
         assert process.wait(60) == 0

@@ -117,7 +117,9 @@ def test_what_was_not_viewed_before_is_there_in_callbacks_only():
     def look():
         assert begun.wait(60)
         try:
-            time.sleep(0.5)  # the callback has returned, and something has collided
+            start = time.process_time()
+            while time.process_time() < start + 0.3:  # the callback has returned, and something has collided
+                time.sleep(0.01)
             sim.velocity
         except carom.UsageError as error:
             told.append(str(error))
