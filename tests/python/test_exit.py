@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+from scenes import ROOT
+
 SCRIPT = """
 import atexit, itertools, os, sys, threading, time
 sys.path.insert(0, {here!r})
@@ -100,3 +102,14 @@ if os.fork() == 0:
 assert os.wait()[1] == 0
 """)
     assert out.startswith("child\n")
+
+
+@pytest.mark.parametrize("before, code", [("", 1), ("import sys, types; sys.modules['mpi4py'] = types.ModuleType('mpi4py')", 0)])
+def test_several_processes_do_not_run_one_study_each(before, code):
+    """By the real mpirun. A script that says by mpi4py that it divides the work is left alone; mpi4py itself need not be installed here."""
+    script = f"{before}\nimport sys\nsys.path.insert(0, {str(pathlib.Path(__file__).parent)!r})\nfrom scenes import five_springs\nfive_springs().run(steps=1)"
+    launch = ["sh", "-c", '. "$0"; exec mpirun --timeout 100 -n 2 "$@"', ROOT / "tools/mpi-env.sh"]
+    done = subprocess.run([*launch, sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
+    assert done.returncode == code, done.stderr
+    assert ("carom.errors.UsageError: Simulation: this is one of 2 processes" in done.stderr) == (code == 1)
+    assert ("mpirun -n … carom run" in done.stderr) == (code == 1)

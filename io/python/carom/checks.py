@@ -1,9 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Checks of arguments, before they reach the engine."""
 
+import os
+import sys
+
 import numpy as np
 
 from carom.errors import UsageError
+
+# What Open MPI, MPICH and Slurm's srun tell each process of a job of several. (SLURM_NTASKS stands in batch scripts, too.)
+PROCESSES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
+
+
+def refuse_ranks():
+    """Raises UsageError in one of several processes of an MPI job, unless the script divides the work itself by mpi4py."""
+    found = next((name for name in PROCESSES if os.environ.get(name, "1") not in ("", "1")), None)
+    if found and "mpi4py" not in sys.modules:
+        raise UsageError(f"Simulation: this is one of {os.environ[found]} processes ({found}), and each would run the whole simulation; a "
+                         "simulation in Python runs on one rank: start the script without mpirun, or write a deck by write_deck() and run "
+                         "it on many ranks by mpirun -n … carom run. If each process has a simulation of its own, import mpi4py first")
 
 
 def numbers(of, name, values):

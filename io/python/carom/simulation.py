@@ -10,7 +10,7 @@ import warnings
 import numpy as np
 
 from carom import files, formats, notebook, page, potentials
-from carom.checks import name_of, numbers, one_or_each, refuse_masked
+from carom.checks import name_of, numbers, one_or_each, refuse_masked, refuse_ranks
 from carom.decks import deck_of, overrides, species_of, surroundings_of, system_of, toml_text, toml_value, write_deck
 from carom.errors import UsageError
 from carom.progress import Progress
@@ -70,6 +70,7 @@ class Simulation:
         self._edges_known = box is not None
 
     def _start(self, session, title=""):
+        refuse_ranks()
         self._session, self.title, self.warnings = session, title, []
         self._cores = False  # a radius was given
         self._output = None  # the arguments of set_output()
