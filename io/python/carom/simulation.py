@@ -112,9 +112,9 @@ class Simulation:
         return self
 
     @classmethod
-    def from_file(cls, file, frame=-1, radius=None, boundary=None):
+    def from_file(cls, file, frame=-1, radius=None, boundary=None, atom_style=None):
         """A simulation with the particles of a GSD, extended XYZ or LAMMPS data file; see carom.formats.read()."""
-        return formats.read(cls, file, frame, radius, boundary)
+        return formats.read(cls, file, frame, radius, boundary, atom_style)
 
     def add_particles(self, position=None, velocity=None, radius=None, mass=1.0, charge=0.0, species="particle", count=None,
                       temperature=None, spin=None, inertia=None, rotational_temperature=None, fixed=False):
