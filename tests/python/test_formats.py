@@ -180,7 +180,7 @@ Bonds
 
 def test_a_lammps_file_with_labels_images_and_ids_in_any_order(tmp_path):
     (tmp_path / "own.data").write_text(LAMMPS)
-    with pytest.warns(UserWarning, match="own.data: the section 'Pair Coeffs' is not read"):
+    with pytest.warns(UserWarning, match="own.data: not read: 'Pair Coeffs'"):
         sim = carom.Simulation.from_file(tmp_path / "own.data", radius=0.5)
     assert sim.species_names == ["Na", "Cl"] and sim.mass.tolist() == [22.99, 22.99, 35.45] and sim.charge.tolist() == [1, 1, -1]
     assert sim.unwrapped.tolist() == [[12, 2, -17], [8, 8, 9], [5, 5, 6]] and sim.image[0].tolist() == [1, 0, -2]

@@ -169,14 +169,14 @@ def read(path, atom_style=None):
     rank = {number: k for k, number in enumerate(order)}
     bonds = [[rank[bonded(file, row, k, ids)] for k in (2, 3)] for row in file.rows("Bonds", "bonds")]
     kinds, names = np.unique(kind), {number: label for label, number in file.labels["Atom"].items()}
-    lost = [f"the section '{name}' is not read" for name, rows in file.sections.items()
+    lost = [f"'{name}'" for name, rows in file.sections.items()
             if rows and name not in ("Atoms", "Velocities", "Masses", "Bonds", "Atom Type Labels", "Bond Type Labels")]
     pick = {name: None if values is None else values[place] for name, values in
             {"velocity": velocity, "mass": masses(file, of, kind, radius), "charge": of.get("charge"), "spin": spin, "radius": radius}.items()}
     return pick | {"edges": edges, "flat": flat, "periodic": [True, True, not flat], "position":
                    (np.column_stack([of[axis] for axis in "xyz"]) - (0 if flat else low) * np.ones(3))[place], "image": image[place],
                    "kind": np.searchsorted(kinds, kind[place]), "names": [names.get(each, str(each)) for each in kinds],
-                   "bonds": np.array(bonds, int).reshape(-1, 2), "lost": lost}
+                   "bonds": np.array(bonds, int).reshape(-1, 2), "lost": [f"not read: {', '.join(lost)}"] if lost else []}
 
 
 def velocities(file, ids, count, spheres):
