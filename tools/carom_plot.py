@@ -12,6 +12,7 @@ import sys
 import textwrap
 
 import matplotlib
+import numpy as np
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -25,6 +26,28 @@ def caption(figure, columns):
     figure.supxlabel(textwrap.fill(command, columns), fontsize=6, family="monospace", color="grey")
 
 
+def label_ends(axes, room=0.3, size=9):
+    """Instead of a legend, writes the label of each curve beside its right end, in its colour; the labels keep their distance.
+
+    room: of the width of the axes, for the labels. Called by panels() for axes whose `at_ends` is set to it.
+    """
+    axes.figure.canvas.draw()
+    lines = [line for line in axes.get_lines() if not line.get_label().startswith("_")]
+    ticks, most = axes.get_xticks(), axes.get_xlim()[1]
+    low, high = axes.transLimits.inverted().transform([[0, 0], [1 + room, 0]])[:, 0]
+    scale = axes.xaxis.get_transform().inverted()
+    axes.set_xlim(*scale.transform([low, high]))
+    axes.set_xticks([tick for tick in ticks if axes.get_xlim()[0] <= tick <= most])
+    axes.figure.canvas.draw()
+    ends = [line.get_xydata()[np.isfinite(line.get_ydata())][-1] for line in lines]
+    heights = axes.transData.transform(ends)[:, 1] * 72 / axes.figure.dpi  # in points
+    last = -np.inf
+    for k in np.argsort(heights):
+        last = max(heights[k], last + 1.25 * size)
+        axes.annotate(lines[k].get_label(), ends[k], (size, last - heights[k]), textcoords="offset points", color=lines[k].get_color(),
+                      fontsize=size, va="center")
+
+
 @contextlib.contextmanager
 def panels(file, *labels):
     """Axes side by side, one for each dictionary of labels; the picture is written at the end, with a legend if there are labels and
@@ -34,10 +57,13 @@ def panels(file, *labels):
     for axes, named in zip(row[0], labels):
         axes.set(**named)
         axes.grid(True, alpha=0.3)
-        if axes.get_legend_handles_labels()[0]:
+        if axes.get_legend_handles_labels()[0] and not hasattr(axes, "at_ends"):
             axes.legend()
     caption(figure, 110 * len(labels))
     figure.tight_layout()
+    for axes in row[0]:
+        if hasattr(axes, "at_ends"):
+            label_ends(axes, axes.at_ends)
     try:
         figure.savefig(file, dpi=150 / len(labels))
     except ValueError as error:  # an unknown format

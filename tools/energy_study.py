@@ -19,7 +19,6 @@ figure. The decks of all runs are written beside the CSV.
 
 import concurrent.futures
 import os
-import re
 import sys
 import tempfile
 
@@ -120,12 +119,10 @@ def describe(rows, method, options):
     worst = max((float(row["relative_energy_error"]) for row in rows
                  if row["method"] == method and row["relative_energy_error"] != ""), default=np.nan)
     if worst < ROUNDING:
-        return rf"{method}: at most {worst:.1e} $E_{{\mathrm{{ref}}}}$"
+        return rf"{method}: ≤ {worst:.1e} $E_{{\mathrm{{ref}}}}$"
     order = fitted_order(*curve(rows, method), options.fit_below)
-    if not np.isfinite(order):
-        return method
-    # With a fixed number of steps the run is longer for larger steps, and its error larger.
-    return f"{method}: order {order:.2f}" if options.end_time else f"{method}: error ~ step$^{{{order:.2f}}}$"
+    # With a fixed number of steps the run is longer for larger steps, and its error larger: the slope is no order.
+    return f"{method}: order {order:.2f}" if options.end_time and np.isfinite(order) else method
 
 
 def draw(rows, options, deck, file):
@@ -135,6 +132,7 @@ def draw(rows, options, deck, file):
     length = f"to t = {options.end_time:g}" if options.end_time else f"{options.count} steps"
     starts = f", {options.starts} starts" if options.starts > 1 else ""
     with picture(file, xlabel="step [time]", ylabel=f"largest {error}", title=f"{title}\n{length}{starts}") as axes:
+        axes.at_ends = 0.65
         for method, marker in with_markers(options.methods):
             steps, errors = curve(rows, method)
             axes.loglog(steps, errors, marker=marker, label=describe(rows, method, options))
@@ -155,8 +153,7 @@ def main(arguments=None):
     write_table(table, COLUMNS, rows)
     draw(rows, options, deck, figure)
     for method in options.methods:
-        line = describe(rows, method, options).replace(r"$E_{\mathrm{ref}}$", "E_ref")
-        print(re.sub(r"error ~ step\$\^{(.*)}\$", r"error ~ step^\1 after a fixed number of steps, which is no order: give --end-time", line))
+        print(describe(rows, method, options).replace(r"$E_{\mathrm{ref}}$", "E_ref").replace("≤", "at most"))
     print(f"Results: {table}, {figure}")
 
 

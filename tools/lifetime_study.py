@@ -157,31 +157,46 @@ def read(file):
 
 
 def draw(lives, options):
-    colours = {"edda": "tab:blue", "psa": "tab:red", "cva": "tab:green", "mcva": "tab:olive", "soft": "tab:grey"}
-    dashes = ("-", "--", "-.", ":", (0, (1, 4)))
+    """The survival with edda at every step, and with psa at steps from long (light) to short (dark); the mean lifetime against the cost."""
+    colours = {"edda": "tab:blue", "psa": "tab:red", "cva": "tab:green", "mcva": "tab:olive"}  # not "soft": other programs are faster there
     of = lambda name: [run for run in lives if run.startswith(f"{name}:")]
+    step = lambda run: run.split(":")[1]
     title = "An isolated cluster of 13 attractive hard spheres"
     with panels(options.output / "lifetimes.png",
                 {"xlabel": "time", "ylabel": "fraction of the clusters that still live", "xscale": "log", "title": title},
                 {"xlabel": "processor seconds of 1000 units of time", "ylabel": "mean lifetime", "yscale": "log",
-                 "title": "Mean lifetime against cost, with the step"}) as (left, right):
-        for name, colour in colours.items():
-            for dash, run in zip(dashes, of(name)):
-                one = lives[run]
-                if name in ("edda", "psa"):
-                    times, alive = one.survival(options.end_time)
-                    left.step(np.append(1.0, times), np.append(1.0, alive), where="post", color=colour, linestyle=dash,
-                              label=f"{name}, step {run.split(':')[1]}")
-            if of(name) and name != "soft":  # programs for soft cores are faster than this engine here
-                each = [lives[run] for run in of(name)]
-                right.errorbar([one.cost for one in each], [one.mean for one in each], [one.error for one in each], color=colour,
-                               marker="o", linestyle=":" if len(each) > 1 else "", capsize=3, label=name)
-                for k, (run, one) in enumerate(zip(of(name), each)):
-                    right.annotate(run.split(":")[1], (one.cost, one.mean), xytext=(5, -11 if k % 2 else 7), textcoords="offset points",
-                                   fontsize=8, color=colour)
+                 "title": "Mean lifetime against cost"}) as (left, right):
+        for k, run in enumerate(of("psa")):
+            times, alive = lives[run].survival(options.end_time)
+            shade = 0.4 + 0.6 * k / max(len(of("psa")) - 1, 1)
+            left.step(np.append(1.0, times), np.append(1.0, alive), where="post", color=colours["psa"], alpha=shade, linewidth=1.2)
+            height = 0.55 - 0.1 * k
+            at = times[np.argmax(alive <= height)] if (alive <= height).any() else times[-1]
+            left.text(at, height, f"psa {step(run)}" if k == 0 else step(run), color=colours["psa"], fontsize=9, ha="center", va="center",
+                      bbox={"facecolor": "white", "edgecolor": "none", "pad": 1})
+        for run in of("edda"):
+            times, alive = lives[run].survival(options.end_time)
+            left.step(np.append(1.0, times), np.append(1.0, alive), where="post", color=colours["edda"], linewidth=1.2)
         if of("edda"):
             mean, error = pooled(lives, of("edda"))
-            right.axhspan(mean - error, mean + error, color=colours["edda"], alpha=0.2, label=f"edda, all steps: {mean:.0f} ± {error:.0f}")
+            left.text(options.end_time, 0.75, "edda\n" + ", ".join(map(step, of("edda"))), color=colours["edda"], fontsize=9, ha="right")
+            right.axhspan(mean - error, mean + error, color=colours["edda"], alpha=0.2)
+            right.text(0.98, mean + 1.3 * error, f"edda, all steps: {mean:.0f} ± {error:.0f}", fontsize=9,
+                       color=colours["edda"], ha="right", va="bottom", transform=right.get_yaxis_transform())
+        for name, colour in colours.items():
+            each = [lives[run] for run in of(name)]
+            if not each:
+                continue
+            right.errorbar([one.cost for one in each], [one.mean for one in each], [one.error for one in each], color=colour, marker="o",
+                           linestyle="-" if name == "psa" else "", linewidth=0.8, capsize=3)
+            for run, one in zip(of(name), each):
+                if name != "edda":
+                    right.annotate(f"{name} {step(run)}", (one.cost, one.mean), xytext=(-7, -16 if name == "cva" else 4), fontsize=9,
+                                   textcoords="offset points", ha="right", color=colour)
+        right.set_xscale("log")
+        right.set_xlim(left=0.6 * right.get_xlim()[0])  # for the first label
+        right.set_xticks([0.5, 1, 2, 5], ["0.5", "1", "2", "5"], minor=False)
+        right.minorticks_off()
 
 
 def pooled(lives, runs):

@@ -226,6 +226,7 @@ def test_a_lammps_file_of_hybrid_spheres_and_a_box_by_vectors(tmp_path):
     ("Cl 35.45\n", "", ":19: the section 'Masses' has no mass of the type 2"),
     ("-1.0 9.0 xlo", "9.0 9.0 xlo", ": the edges of the box are 0.0"),
     ("Bonds\n", "Ellipsoids\n\n3 1 1 2 1 0 0 0\n\nBonds\n", ":41: the file has particles that are no spheres"),
+    ("1 Na\n2 Cl", "Na 1\n2 Cl", ":14: 'Na' is no whole number"),
     ("Bonds\n", "Velocities\n", ":39: there is a second section 'Velocities'"),
 ])
 def test_lammps_files_at_odds_with_themselves(tmp_path, old, new, words):
@@ -337,3 +338,38 @@ def test_a_missing_package_is_named(tmp_path, monkeypatch, ending, name):
     (tmp_path / f"a.{ending}").write_text("")
     with pytest.raises(ImportError, match=f"needs the Python package {name}: install Debian's python3-{name}"):
         carom.Simulation.from_file(tmp_path / f"a.{ending}")
+
+
+def test_a_lammps_file_as_mdanalysis_reads_it(tmp_path):
+    """Where its reader keeps everything: ids in order, the style full, single precision."""
+    mda = pytest.importorskip("MDAnalysis")
+    rng = np.random.default_rng(5)
+    rows = [f"{k + 1} {k // 2 + 1} {k % 2 + 1} {(-1) ** k * 0.5} {x} {y} {z} 0 0 0" for k, (x, y, z) in enumerate(rng.uniform(0, 9, (20, 3)))]
+    speeds = [f"{k + 1} {x} {y} {z}" for k, (x, y, z) in enumerate(rng.normal(size=(20, 3)))]
+    bonds = [f"{k + 1} 1 {2 * k + 1} {2 * k + 2}" for k in range(10)]
+    (tmp_path / "own.data").write_text("\n".join(
+        ["title", "", "20 atoms", "10 bonds", "2 atom types", "1 bond types", "0 9 xlo xhi", "0 9 ylo yhi", "0 9 zlo zhi", "", "Masses", "", "1 1.0", "2 3.0",
+         "", "Atoms # full", "", *rows, "", "Velocities", "", *speeds, "", "Bonds", "", *bonds, ""]))
+    sim = carom.Simulation.from_file(tmp_path / "own.data", radius=0.01)
+    there = mda.Universe(str(tmp_path / "own.data"), format="DATA", convert_units=False).atoms
+    order = np.argsort(there.types.astype(int), kind="stable")  # species by species
+    for mine, theirs in ((sim.position, there.positions), (sim.velocity, there.velocities), (sim.mass, there.masses), (sim.charge, there.charges)):
+        assert np.allclose(mine, theirs[order], atol=1e-5)
+    rank = np.argsort(order)
+    assert sorted(map(sorted, sim.bonds.tolist())) == sorted(sorted(rank[list(bond)]) for bond in there.universe.bonds.indices)
+
+
+def test_two_dimensions_and_images_of_other_programs(tmp_path):
+    (tmp_path / "flat.data").write_text("\n\n1 atoms\n1 atom types\n0 5 xlo xhi\n0 4 ylo yhi\n-0.1 0.1 zlo zhi\n\nAtoms # atomic\n\n1 1 1.0 2.0 0.0\n")
+    assert carom.Simulation.from_file(tmp_path / "flat.data", radius=0.5).box == [5, 4]
+    hoomd = pytest.importorskip("gsd.hoomd")
+    snapshot = hoomd.Snapshot()
+    snapshot.particles.N, snapshot.configuration.box = 1, [10, 8, 6, 0, 0, 0]
+    snapshot.particles.position, snapshot.particles.diameter, snapshot.particles.image = [[0, 0, 0]], [1], [[2, 0, -1]]
+    with hoomd.open(name=str(tmp_path / "own.gsd"), mode="wb") as file:
+        file.append(snapshot)
+    sim = carom.Simulation.from_file(tmp_path / "own.gsd")
+    assert sim.image.tolist() == [[2, 0, -1]] and sim.unwrapped.tolist() == [[25, 4, -3]]
+    (tmp_path / "thin.xyz").write_text('1\nLattice="8 0 0 0 0 0 0 0 9" pbc="T T T"\nC 1 2 3\n')
+    with pytest.raises(carom.FileError, match="thin.xyz: the edges of the box are 8.0, 0.0, 9.0"):
+        carom.Simulation.from_file(tmp_path / "thin.xyz", radius=0.5)

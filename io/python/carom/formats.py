@@ -22,13 +22,16 @@ def package(name, debian):
 
 def read_gsd(path, frame):
     hoomd = package("gsd.hoomd", "python3-gsd")
-    with hoomd.open(str(path), "rb") as file:
-        snapshot = file[frame]
+    try:
+        with hoomd.open(str(path), "rb") as file:
+            snapshot = file[frame]
+    except (OSError, RuntimeError, IndexError) as error:
+        raise FileError(f"{path}: cannot read it: {error}") from error
     p, box = snapshot.particles, np.asarray(snapshot.configuration.box, dtype=float)
     flat = snapshot.configuration.dimensions == 2
     # In GSD the origin is in the middle of the box. Single precision may put a position beyond an edge by its rounding.
     return {"edges": box[:3], "tilt": box[3:], "flat": flat, "periodic": [True, True, not flat],
-            "position": np.asarray(p.position, dtype=float) + box[:3] / 2, "velocity": p.velocity, "mass": p.mass,
+            "position": np.asarray(p.position, dtype=float) + box[:3] / 2, "image": np.asarray(p.image), "velocity": p.velocity, "mass": p.mass,
             "charge": p.charge, "spin": _spins_of_gsd(p), "radius": np.asarray(p.diameter, dtype=float) / 2, "kind": p.typeid, "names": list(p.types),
             "bonds": np.asarray(snapshot.bonds.group, dtype=int).reshape(-1, 2)}
 
@@ -47,7 +50,7 @@ def _spins_of_gsd(p):
 def read_extxyz(path, frame):
     """ASE reads the line with the box. Its reader of the columns takes elements only, and gives them the masses of these."""
     comment_of = package("ase.io.extxyz", "python3-ase").key_val_str_to_dict
-    lines = path.read_text().splitlines()
+    lines = lammps_data.text_of(path).splitlines()
     starts, at = [], 0
     while at < len(lines) and lines[at].strip():
         if not lines[at].strip().isdigit() or at + 2 + int(lines[at]) > len(lines):
@@ -143,14 +146,11 @@ def read(kind_of_simulation, file, frame=-1, radius=None, boundary=None, atom_st
     if not path.is_file():
         raise FileError(f"{file}: there is no such file; check the path")
     reader = READERS[path.suffix]
-    try:
-        found = reader(path, atom_style) if reader is lammps_data.read else reader(path, frame)
-    except (FileError, UsageError, ImportError):
-        raise
-    except Exception as error:
-        raise FileError(f"{file}: cannot read it: {error}") from error
+    found = reader(path, atom_style) if reader is lammps_data.read else reader(path, frame)
     told = found.get("lost", []) + _rectangular(file, found)
     flat, columns = found["flat"], 2 if found["flat"] else 3
+    if not (np.asarray(found["edges"][:columns]) > 0).all():
+        raise FileError(f"{file}: the edges of the box are {', '.join(map(str, found['edges'][:columns]))}; all must be positive")
     rules = [boundary] * columns if isinstance(boundary, str) else boundary or ["periodic" if each else "open" for each in found["periodic"][:columns]]
     simulation = kind_of_simulation(box=found["edges"][:columns], boundary=rules)
     if found["mass"] is None:
@@ -200,17 +200,17 @@ def _rectangular(file, found):
 def _pushed_apart(position, radius, edges):
     """Positions from numbers of single precision, where touching spheres no longer overlap, and the largest distance moved.
 
-    Each coordinate is off by at most half a unit in the last place of the largest one, and so is a radius. Spheres that touch in
-    double precision overlap by no more than `rounding`. Spheres that overlap by more are left as they are: the run refuses them.
-    edges: of periodic directions, else 0.
+    Each coordinate is off by at most half a unit in the last place of the largest one, and so are radii and edges. So spheres that
+    touch in double precision overlap by no more than `rounding`, and moves as short as that suffice. If spheres overlap by more, or
+    sweeps over the pairs find no such moves, all are left as they are: the run refuses them. edges: of periodic directions, else 0.
     """
     spacing = float(np.spacing(np.float32(np.abs(position).max(initial=0) + edges.max(initial=0))))
     rounding = 2 * spacing * position.shape[1] ** 0.5
-    tree = package("scipy.spatial", "python3-scipy").cKDTree
     moved, wide = np.zeros_like(position), radius.max(initial=0)
     if wide == 0:
         return position, 0.0
-    for _ in range(100):  # sweeps: clusters of touching spheres need several
+    tree = package("scipy.spatial", "python3-scipy").cKDTree
+    for _ in range(100):  # a sweep takes milliseconds; chains of touching spheres need about ten
         x = position + moved
         pairs = tree(np.where(edges > 0, x % np.where(edges > 0, edges, 1), x), boxsize=edges).query_pairs(2 * wide, output_type="ndarray")
         apart = x[pairs[:, 1]] - x[pairs[:, 0]]
@@ -224,6 +224,6 @@ def _pushed_apart(position, radius, edges):
         push = ((contact * (1 + 4e-15) - distance) / 2 / distance)[close, None] * apart[close]
         np.add.at(moved, pairs[close, 0], -push)
         np.add.at(moved, pairs[close, 1], push)
-        if np.abs(moved).max() > 8 * rounding:
+        if np.linalg.norm(moved, axis=1).max() > rounding:
             break
     return position, 0.0

@@ -34,7 +34,7 @@ class DataFile:
     def __init__(self, path):
         self.path, self.head, self.sections, self.hints, self.labels = path, {}, {}, {}, {}
         name = None
-        for number, text in enumerate(path.read_text().splitlines()[1:], 2):
+        for number, text in enumerate(text_of(path).splitlines()[1:], 2):
             words, comment = text.partition("#")[0].split(), text.partition("#")[2].split()
             if not words:
                 continue
@@ -48,9 +48,9 @@ class DataFile:
                 self.head[" ".join(words[count:])] = Row(number, words[:count])
             else:
                 self.sections[name].append(Row(number, words))
-        for what in ("Atom", "Bond"):
-            self.labels[what] = {row.words[1]: int(row.words[0]) for row in self.sections.get(f"{what} Type Labels", [])
-                                 if len(row.words) == 2 or self.fail(row.line, "a type label is a number and a word")}
+        for row in self.sections.get("Atom Type Labels", []):
+            number = self.number(row, 0, int)
+            self.labels[row.words[-1]] = number if len(row.words) == 2 else self.fail(row.line, "a type label is a number and a word")
 
     def fail(self, line, problem, kind=FileError):
         raise kind(f"{self.path}:{line}: {problem}" if line else f"{self.path}: {problem}")
@@ -78,15 +78,21 @@ class DataFile:
                       f"the header states {stated} {counted}, and there are {len(found)} rows under '{name}'; is the file cut off?")
         return found
 
-    def kind(self, word, row, what="Atom"):
-        """The number of a type, which may be given by its label."""
-        number = self.labels[what].get(word)
-        if number is None:
-            number = self.number(row, row.words.index(word), int)
-        most = self.stated(f"{what.lower()} types", 0)
+    def kind(self, row, k):
+        """The number of the type of atoms in a column, where it may be given by its label."""
+        if len(row.words) > k and row.words[k] in self.labels:
+            return self.labels[row.words[k]]
+        number, most = self.number(row, k, int), self.stated("atom types", 0)
         if not 1 <= number <= most:
-            self.fail(row.line, f"the type {word} is not one of the {most} {what.lower()} types that the header states")
+            self.fail(row.line, f"the type {number} is not one of the {most} atom types that the header states")
         return number
+
+
+def text_of(path):
+    try:
+        return path.read_text()
+    except UnicodeDecodeError as error:
+        raise FileError(f"{path}: is no text: {error}") from error
 
 
 def is_number(word):
@@ -158,17 +164,18 @@ def read(path, atom_style=None):
             file.fail(row.line, f"the atom {number} was in line {atoms[ids[number]].line} already; give each atom an id of its own")
         ids[number] = k
         for column, name in enumerate(columns, 1):
-            of[name][k] = file.kind(row.words[column], row) if name == "type" else file.number(row, column)
+            of[name][k] = file.kind(row, column) if name == "type" else file.number(row, column)
         image[k] = [file.number(row, len(columns) + 1 + axis, int) for axis in range(3)] if len(row.words) > len(columns) + 1 else 0
     kind = of["type"].astype(int)
     radius = of["diameter"] / 2 if "diameter" in of else None
     velocity, spin = velocities(file, ids, len(atoms), radius is not None)
-    flat = edges[2] == 1 and low[2] == -0.5 and not of["z"].any()
+    # A file of a simulation in two dimensions: a thin box about z = 0, where all atoms are.
+    flat = edges[2] <= 1 and low[2] == -edges[2] / 2 and not of["z"].any() and (velocity is None or not velocity[:, 2].any())
     order = sorted(ids, key=int)
     place = np.array([ids[number] for number in order])
     rank = {number: k for k, number in enumerate(order)}
     bonds = [[rank[bonded(file, row, k, ids)] for k in (2, 3)] for row in file.rows("Bonds", "bonds")]
-    kinds, names = np.unique(kind), {number: label for label, number in file.labels["Atom"].items()}
+    kinds, names = np.unique(kind), {number: label for label, number in file.labels.items()}
     lost = [f"'{name}'" for name, rows in file.sections.items()
             if rows and name not in ("Atoms", "Velocities", "Masses", "Bonds", "Atom Type Labels", "Bond Type Labels")]
     pick = {name: None if values is None else values[place] for name, values in
@@ -204,7 +211,7 @@ def masses(file, of, kind, radius):
     if radius is not None:
         return of["density"] * np.where(radius > 0, 4 / 3 * math.pi * radius**3, 1.0)
     rows = file.sections.get("Masses", [])
-    found = {file.kind(row.words[0], row): file.number(row, 1) for row in rows}
+    found = {file.kind(row, 0): file.number(row, 1) for row in rows}
     if rows and (unknown := set(kind) - set(found)):
         file.fail(rows[-1].line, f"the section 'Masses' has no mass of the type {min(unknown)}")
     return np.array([found[each] for each in kind]) if rows else None
