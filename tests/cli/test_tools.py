@@ -23,6 +23,7 @@ import plot_energy
 import plot_msd
 import plot_rdf
 import plot_sk
+import plot_transport
 from carom_files import Trajectory, toml_text
 from synthetic_run import write_run
 
@@ -326,6 +327,21 @@ def test_errors_of_tables_are_bars(tmp_path, monkeypatch):
     (tmp_path / "sk.csv").write_text("a,b\n1,2\n")
     with pytest.raises(SystemExit, match="sk.csv"):
         plot_sk.main([str(tmp_path)])
+
+
+def test_transport_coefficients_are_drawn_from_the_averages_of_a_run(tmp_path, monkeypatch):
+    (tmp_path / "transport.csv").write_text("time,vacf,diffusion,error_vacf,samples_vacf,error_diffusion,samples_diffusion\n"
+                                            "0,3,nan,0.01,50,nan,nan\n0.5,1,0.5,0.02,50,0.01,40\n1,0.1,0.75,0.02,50,0.02,30\n")
+    (tmp_path / "summary.json").write_text('{"transport": {"diffusion": {"mean": 0.75, "standard_error": 0.02}}}')
+    drawn, values = [], []
+    monkeypatch.setattr("matplotlib.axes.Axes.errorbar", lambda axes, x, y, error, **_: drawn.append((x.tolist(), y.tolist()[1:], error.tolist()[1:])))
+    monkeypatch.setattr("matplotlib.axes.Axes.axhspan", lambda axes, low, high, **_: values.append((low, high)))
+    plot_transport.main([str(tmp_path)])
+    lags = [0, 0.5, 1]
+    assert drawn == [(lags, [1, 0.1], [0.02, 0.02]), (lags, [0.5, 0.75], [0.01, 0.02])] and values == [pytest.approx((0.73, 0.77))]
+    assert (tmp_path / "transport.png").stat().st_size > 1000
+    with pytest.raises(SystemExit, match="There is no viscosity in .*, only vacf, diffusion"):
+        plot_transport.main([str(tmp_path), "--columns", "viscosity"])
 
 
 def test_compare(tmp_path):
