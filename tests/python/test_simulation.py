@@ -428,3 +428,28 @@ def test_rough_spheres_that_are_placed_and_written(tmp_path):
     again.run(time=3)
     whole.run(time=3)
     assert (again.spin == whole.spin).all() and again.energy_error < 1e-13
+
+
+@pytest.mark.parametrize("files", [False, True])
+def test_overlaps_are_a_warning(tmp_path, files):
+    """Three discs that fall onto each other and sink into each other, by 3.2e-7 diameters; at a longer step so far that the run fails."""
+    def pile(step):
+        sim = carom.Simulation(box=[5.3, 10], boundary="wall")
+        sim.add_particles(position=[[4.323, 1.303], [3.183, 2.956], [4.309, 2.451]], velocity=[[0.4, 0], [0.4, 0], [0.18, 0]],
+                          radius=0.5)
+        sim.add_contact("*", "*", restitution=0)
+        sim.add_force("uniform-field", acceleration=[0, -1])
+        sim.integrator("cva", step=step)
+        if files:
+            sim.output(tmp_path / str(step))
+        return sim
+
+    sim = pile(0.005)
+    sim.run(time=0.5)
+    assert sim.warnings == []
+    with pytest.warns(UserWarning, match="particles 0 and 2 overlap, by 3.20273e-07 of their contact distance, at time 2.00257") as caught:
+        sim.run(time=2.1)
+    assert len(caught) == len(sim.warnings) == 1
+    with pytest.warns(UserWarning, match="overlap, by 7.44347e-07 of their contact distance, at time 1.44"):
+        with pytest.raises(carom.NumericalError, match="overlap, by 1.07492e-06 .*, at step 73"):
+            pile(0.02).run(time=2.1)
