@@ -167,7 +167,7 @@ class PairTerm final : public Interaction<D> {
   struct OwnImages {
     double energy = 0, magnitude = 0;                                          // Σ U, Σ |U|
     Eigen::Matrix<double, D, D> stress = Eigen::Matrix<double, D, D>::Zero();  // Σ d_a F_b
-    bool any = false;
+    double nearest = std::numeric_limits<double>::infinity();                  // |d| [length]
   };
   /// Calls add(particle, weight, images) for each own particle that meets its images.
   void add_own_images(auto&& add) const {
@@ -180,9 +180,9 @@ class PairTerm final : public Interaction<D> {
         images.energy += energy;
         images.magnitude += std::abs(energy);
         images.stress += (-2 * potential_.derivative(rho)) * d * d.transpose();
-        images.any = true;
+        images.nearest = std::min(images.nearest, std::sqrt(rho));
       });
-      if (!images.any) return;
+      if (!(images.nearest < std::numeric_limits<double>::infinity())) return;
       const auto* factor = factors();
       for (Id i = 0; i < particles_.size(); ++i)
         if (particles_.owns(i) && pairs_.takes_images_of(i)) add(i, factor ? (*factor)[i] * (*factor)[i] : 1, images);
@@ -244,10 +244,15 @@ class PairTerm final : public Interaction<D> {
     sums->energy.add(totals.energy, sums->quantum);
     sums->magnitude.add(totals.magnitude, sums->quantum);
     sums->virial.add(totals.virial, 64 * sums->quantum);
-    add_own_images([&](Id, double w, const OwnImages& images) {
+    add_own_images([&](Id i, double w, const OwnImages& images) {
+      const double virial = w * images.stress.trace();
+      if (!std::isfinite(w * images.magnitude + virial))
+        throw Error(Failure::numerical, "the force between particle " + std::to_string(particles_.id_of(i)) +
+                                            " and its own image, " + short_text(images.nearest) +
+                                            " apart, is too large or no number; use a larger box");
       sums->energy.add(w * images.energy);
       sums->magnitude.add(w * images.magnitude);
-      sums->virial.add(w * images.stress.trace());
+      sums->virial.add(virial);
     });
     return own;
   }
