@@ -451,6 +451,23 @@ TEST(Decomposition, StepsThatTakeAllParticles) {
 TEST(Decomposition, WithoutCores) {
   for (const auto& scene : {yukawa(0.1), yukawa(0.3)}) compare<3>(scene, "verlet", 0.01, 150, 0);
 }
+/// A channel narrower than the cutoff, in which each disc meets its own images; charges of both signs.
+TEST(Decomposition, OwnImages) {
+  const auto channel = [] {
+    std::vector<Vec<2>> x, v;
+    for (int i = 0; i < 150; ++i) {
+      x.push_back({0.4 + 0.8 * (i / 2), 0.1 + 0.85 * (i % 2)});
+      v.push_back({std::sin(37.0 * i), std::cos(11.0 * i)});
+    }
+    auto system = test::make_system<2>({60, 1.7}, Boundary::periodic, x, v, std::vector<double>(150, 0.3));
+    for (Id i = 0; i < 150; ++i) system->particles.charge[i] = i % 3 == 0 ? -1.5 : 1;
+    test::add_interaction(
+        *system, "yukawa",
+        {{"amplitude", 1.0}, {"kappa", 1.0}, {"charges", true}, {"cutoff", 3.6}, {"cut", std::string("shifted")}});
+    return system;
+  };
+  for (const char* method : {"verlet", "psa", "edda"}) compare<2>(channel, method, 0.02, 12, method[0] == 'v' ? 0 : 20);
+}
 /// The final error of a run of free discs on each of this many ranks; 0: without ranks.
 std::string failure_of(const System<2>& start, const IntegratorInfo& info, const Given& given, int ranks) {
   std::vector<std::string> all(static_cast<std::size_t>(std::max(ranks, 1)));
