@@ -80,6 +80,7 @@ struct Contact {
   Vec<D> impulse;     ///< on `lo`; `hi` receives its negative [mass·length/time]
   Exchange exchange{};
   double overlap = 0;  ///< at contact, relative to the contact distance, if the method computes it
+  double sigma = 0;    ///< then the contact distance; for a sphere and a wall it is the radius [length]
   /// Velocities after the contact [length/time]; for a wall event v_hi is 0.
   Vec<D> v_lo = Vec<D>::Zero(), v_hi = Vec<D>::Zero();
 };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "engine/base/archive.h"
@@ -33,11 +34,67 @@ struct WallTally {
   }
 };
 
-struct ContactTally {
+/// Depth relative to the contact distance up to which an overlap is taken for rounding. Contacts touch within the gap
+/// tolerance (wall.h), 1e-13 of the contact distance, and the methods leave up to ten times as much; this is a hundred
+/// times. Where 4 ulp of the box are the larger tolerance, see kRoundingOfPositions (engine/run/monitor.cc).
+inline constexpr double kRoundingOfOverlaps = 1e-11;
+
+/// An overlap of two spheres, or of a sphere and a wall.
+struct Overlap {
+  double depth = 0;   ///< relative to the contact distance
+  double length = 0;  ///< [length]
+  double time = 0;    ///< since the start of the slab
+  EventKind kind = EventKind::pair;
+  Id lo = 0, hi = 0;  ///< as in EventKey
+
+  Overlap() = default;
+  /// `sigma`: the contact distance; for a sphere and a wall it is the radius.
+  template <int D>
+  Overlap(double relative, double sigma, const EventKey<D>& key)
+      : depth(relative), length(relative * sigma), time(key.time), kind(key.kind), lo(key.lo), hi(key.hi) {}
+  /// Whether it is longer; a total order, so that no two ranks choose differently.
+  bool is_worse_than(const Overlap& other) const {
+    return std::tuple(-length, time, kind, lo, hi) <
+           std::tuple(-other.length, other.time, other.kind, other.lo, other.hi);
+  }
+};
+
+/// "particles 3 and 7 overlap, by 2e-08 of their contact distance".
+template <int D>
+std::string overlap_text(const Overlap& overlap, const Box<D>& box) {
+  EventKey<D> key{.kind = overlap.kind, .lo = overlap.lo, .hi = overlap.hi};
+  return partners(key, box) + " overlap, by " + short_text(overlap.depth) +
+         (overlap.kind == EventKind::pair ? " of their contact distance" : " of its radius");
+}
+
+struct OverlapTally {
+  double max_overlap = 0;  ///< the deepest one, relative to the contact distance
+  /// The longest one of the present slab that is deeper than kRoundingOfOverlaps; with positions of one size, either it
+  /// is more than rounding or none is.
+  Overlap worst{};
+
+  /// `overlap()` names the partners of a deep one.
+  template <class Named>
+  void note_overlap(double depth, Named&& overlap) {
+    max_overlap = std::max(max_overlap, depth);
+    if (depth > kRoundingOfOverlaps) [[unlikely]]
+      note(overlap());
+  }
+  void add(const OverlapTally& other) {
+    max_overlap = std::max(max_overlap, other.max_overlap);
+    note(other.worst);
+  }
+
+ private:
+  void note(const Overlap& overlap) {
+    if (overlap.is_worse_than(worst)) worst = overlap;
+  }
+};
+
+struct ContactTally : OverlapTally {
   std::uint64_t sphere_sphere = 0;  ///< executed pair collisions
   std::uint64_t sphere_wall = 0;    ///< executed wall collisions
   std::uint64_t kicks = 0;          ///< kicks by a bath
-  double max_overlap = 0;           ///< deepest overlap at a contact, relative to the contact distance
   ExactSum collision_virial;        ///< Σ d·impulse over pair collisions [mass·length²/time]
   ExactSum dissipated;              ///< energy lost at contacts [energy]
   ExactSum work;                    ///< work done on spheres by moving walls [energy]
@@ -53,13 +110,12 @@ struct ContactTally {
     if (walls.size() <= number) walls.resize(number + 1);
     return walls[number];
   }
-  void add_pair(const Exchange& exchange, double overlap) {
+  void add_pair(const Exchange& exchange) {
     ++sphere_sphere;
     collision_virial.add(exchange.virial);
     if (exchange.dissipated != 0) dissipated.add(exchange.dissipated);
-    max_overlap = std::max(max_overlap, overlap);
   }
-  void add_wall(Id number, const Exchange& exchange, double overlap) {
+  void add_wall(Id number, const Exchange& exchange) {
     if (number == Bath::kNumber) {
       ++kicks;
       return heat.add(exchange.heat);
@@ -69,13 +125,12 @@ struct ContactTally {
     for (const auto& [sum, term] :
          {std::pair{&work, exchange.work}, {&heat, exchange.heat}, {&dissipated, exchange.dissipated}})
       if (term != 0) sum->add(term);
-    max_overlap = std::max(max_overlap, overlap);
   }
   void add(const ContactTally& other) {
     sphere_sphere += other.sphere_sphere;
     sphere_wall += other.sphere_wall;
     kicks += other.kicks;
-    max_overlap = std::max(max_overlap, other.max_overlap);
+    OverlapTally::add(other);
     collision_virial.add(other.collision_virial);
     dissipated.add(other.dissipated);
     work.add(other.work);
@@ -83,15 +138,16 @@ struct ContactTally {
     for (std::size_t number = other.walls.size(); number-- > 0;) wall(static_cast<Id>(number)).add(other.walls[number]);
   }
   void archive(Archive& archive) {
-    archive(sphere_sphere, sphere_wall, kicks, max_overlap, collision_virial, dissipated, work, heat, walls);
+    archive(sphere_sphere, sphere_wall, kicks, max_overlap, worst, collision_virial, dissipated, work, heat, walls);
   }
   /// Counts a contact and appends it to `log` unless `log` is null.
   template <int D>
   void record(const Contact<D>& contact, std::vector<Contact<D>>* log) {
     if (contact.key.kind == EventKind::pair)
-      add_pair(contact.exchange, contact.overlap);
+      add_pair(contact.exchange);
     else
-      add_wall(contact.key.hi, contact.exchange, contact.overlap);
+      add_wall(contact.key.hi, contact.exchange);
+    note_overlap(contact.overlap, [&] { return Overlap(contact.overlap, contact.sigma, contact.key); });
     if (log) log->push_back(contact);
   }
 };

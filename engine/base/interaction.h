@@ -45,7 +45,7 @@ struct PotentialSums {
   ExactSum energy{};     ///< V [energy]
   ExactSum magnitude{};  ///< Σ|V| over pairs and particles [energy]
   ExactSum virial{};     ///< Σ d·F over pairs, d = x_i − x_j, F the force on i, without external fields [energy]
-  double quantum = 0x1p-46;  ///< each pair's terms are rounded to a multiple of it [energy]
+  double quantum = 0x1p-46;  ///< the terms of each pair of two particles are rounded to a multiple of it [energy]
 
   void add(const PotentialSums& other) {
     energy.add(other.energy);

@@ -191,10 +191,12 @@ void EventCore<D>::collide_pair(Slot i, Slot j, std::uint32_t partner, double ti
   ++queue_[j].version;
   if (report.trace)
     return report.trace->end(flights_[i], flights_[j], {EventKind::pair, impact.exchange}, impact.overlap);
-  report.counters.add_pair(impact.exchange, impact.overlap);
-  if (!report.contacts) return;
-  const EventKey<D> key = pair_key<D>(time, generation, flights_[i].id, flights_[j].id, packing.image(partner));
-  report.contacts->push_back(flights_.contact_of(key, flights_[i], flights_[j], shift, impact));
+  report.counters.add_pair(impact.exchange);
+  const auto key = [&] {
+    return pair_key<D>(time, generation, flights_[i].id, flights_[j].id, packing.image(partner));
+  };
+  report.counters.note_overlap(impact.overlap, [&] { return Overlap(impact.overlap, impact.sigma, key()); });
+  if (report.contacts) report.contacts->push_back(flights_.contact_of(key(), flights_[i], flights_[j], shift, impact));
 }
 
 template <int D>
@@ -209,7 +211,8 @@ void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, c
   ++queue_[i].version;
   if (report.trace)
     return report.trace->end(flights_[i], flights_[i], {EventKind::wall, impact.exchange}, impact.overlap);
-  report.counters.add_wall(key.hi, impact.exchange, impact.overlap);
+  report.counters.add_wall(key.hi, impact.exchange);
+  report.counters.note_overlap(impact.overlap, [&] { return Overlap(impact.overlap, impact.sigma, key); });
   if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], impact));
 }
 

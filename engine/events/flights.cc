@@ -205,7 +205,7 @@ template <class... Spins>
     b.v -= impulse / mass_b;
   }
   a.generation = b.generation = static_cast<std::uint16_t>(generation);
-  return {d, impulse, {.virial = d.dot(impulse), .dissipated = dissipated}, 1 - d.norm() / sigma};
+  return {d, impulse, {.virial = d.dot(impulse), .dissipated = dissipated}, 1 - d.norm() / sigma, sigma};
 }
 
 template <int D>
@@ -232,19 +232,21 @@ Impact<D> Flights<D>::bounce(Slot i, Record<D>& r, Spin<D>* spin, const Wall<D>&
   r.v = after;
   r.generation = static_cast<std::uint16_t>(generation);
   const double overlap = wall.bath ? 0 : -wall.gap(r.x, at_contact, t) / at_contact;
-  return {r.x - wall.foot(r.x, t), impulse, exchange, overlap};
+  return {r.x - wall.foot(r.x, t), impulse, exchange, overlap, at_contact};
 }
 
 template <int D>
 Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
                                   const Impact<D>& impact) const {
-  if (a.id < b.id) return {key, a.x, b.x - shift, impact.impulse, impact.exchange, impact.overlap, a.v, b.v};
-  return {key, b.x, a.x + shift, -impact.impulse, impact.exchange, impact.overlap, b.v, a.v};
+  const auto& [d, impulse, exchange, overlap, sigma] = impact;
+  if (a.id < b.id) return {key, a.x, b.x - shift, impulse, exchange, overlap, sigma, a.v, b.v};
+  return {key, b.x, a.x + shift, -impulse, exchange, overlap, sigma, b.v, a.v};
 }
 
 template <int D>
 Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& r, const Impact<D>& impact) const {
-  return {key, r.x, box_.wall(key.hi).foot(r.x, key.time), impact.impulse, impact.exchange, impact.overlap, r.v};
+  const auto& [d, impulse, exchange, overlap, sigma] = impact;
+  return {key, r.x, box_.wall(key.hi).foot(r.x, key.time), impulse, exchange, overlap, sigma, r.v};
 }
 
 template class Flights<2>;

@@ -26,6 +26,7 @@ struct Impact {
   Vec<D> impulse;  ///< impulse on the first sphere [mass·length/time]
   Exchange exchange;
   double overlap;  ///< at contact, relative to the contact distance
+  double sigma;    ///< the contact distance; for a sphere and a wall it is the radius [length]
 };
 
 template <int D>
@@ -124,6 +125,9 @@ class Flights {
 
   std::span<const Wall<D>> walls() const { return walls_; }
 
+  /// The contact distance of two spheres at time 0; the radius of one [length].
+  double contact_distance(Slot i, Slot j) const { return radius(i) + radius(j); }
+  double radius(Slot i) const { return radius_.empty() ? common_radius_ : radius_[i]; }
   /// Whether all spheres have the same radius.
   bool equal() const { return common_radius_ != 0; }
 
@@ -151,7 +155,6 @@ class Flights {
   /// The spheres of a compression, which grow, are elastic.
   const ContactLaws& laws() const { return growth_ == 0 ? box_.contacts : elastic_; }
   double grown(double length, double t) const { return length * (1 + growth_ * t); }
-  double radius(Slot i) const { return radius_.empty() ? common_radius_ : radius_[i]; }
   double mass(Slot i) const { return mass_.empty() ? common_mass_ : mass_[i]; }
 
   const Box<D>& box_;

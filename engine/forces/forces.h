@@ -155,19 +155,23 @@ double sum_over_all(const System<D>& system, auto&& term) {
   return system.decomposition.sum(own.sum()).value();
 }
 
-/// Exact sums over all particles.
+/// Exact sums and extremes over all particles.
 template <int D>
 struct MotionSums {
   ExactSum kinetic;                  ///< ½ m v² [energy]
   ExactSum rotational;               ///< ½ I ω² if contacts are rough [energy]
   ExactSum speed;                    ///< |v| [length/time]
   std::array<ExactSum, D> momentum;  ///< m v [mass·length/time]
+  double fastest = 0;                ///< largest |v| [length/time]
+  double farthest = 0;               ///< largest coordinate [length]
 
   void add(const MotionSums& other) {
     kinetic.add(other.kinetic);
     rotational.add(other.rotational);
     speed.add(other.speed);
     for (int k = 0; k < D; ++k) momentum[k].add(other.momentum[k]);
+    fastest = std::max(fastest, other.fastest);
+    farthest = std::max(farthest, other.farthest);
   }
 };
 
@@ -176,14 +180,17 @@ template <int D>
 MotionSums<D> own_motion(const System<D>& system, const Particles<D>& state, const Particles<D>& at) {
   ExactSeries kinetic, speed;
   std::array<ExactSeries, D> momentum;
+  double fastest = 0, farthest = 0;
   for (Id i = 0; i < at.size(); ++i) {
     if (!system.particles.owns(i)) continue;
     const double squared = at.v[i].squaredNorm();
     kinetic.add(0.5 * moving_mass(at.mass[i]) * squared);
     speed.add(std::sqrt(squared));
+    fastest = std::max(fastest, squared);
+    farthest = std::max(farthest, at.x[i].cwiseAbs().maxCoeff());
     for (int k = 0; k < D; ++k) momentum[k].add(moving_mass(state.mass[i]) * state.v[i][k]);
   }
-  MotionSums<D> sums{kinetic.sum(), {}, speed.sum(), {}};
+  MotionSums<D> sums{kinetic.sum(), {}, speed.sum(), {}, std::sqrt(fastest), farthest};
   if (system.box.contacts.rough()) {
     ExactSeries rotational;
     for (Id i = 0; i < at.size(); ++i)

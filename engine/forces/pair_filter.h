@@ -82,6 +82,8 @@ struct SpeciesRule {
     return ((code & PartnerSearch::kFirst) != 0 ? PartnerSearch::kSecond : 0u) |
            ((code & PartnerSearch::kSecond) != 0 ? PartnerSearch::kFirst : 0u);
   }
+  /// Whether a particle and its own images are such a pair.
+  bool takes_images_of(Id i) const { return (code(i) & partner_code(code(i))) != 0; }
 };
 
 /// The pairs on which a term acts. The particles it refers to must outlive it.

@@ -135,7 +135,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     double& longest = found_.longest;
     while (done < slab.length) {
       const bool resolved = found_.touching;
-      if (resolved && (found_.touching = system.decomposition.any(!scan.quiet(p.x, p.v)))) {
+      if (resolved && (found_.touching = system.decomposition.any(!scan.quiet(done, p.x, p.v)))) {
         system.decomposition.need_all();
         owed_ += scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) {
           return resolve_contact<D>(touch.key, touch.normal, system.box, p);

@@ -115,8 +115,8 @@ IntegratorInfo free_flight() {
   epoch.fallback = "none";
   epoch.meaning =
       "length of an epoch, after which all particles are moved to the same time; default: about forty mean free times, "
-      "but at most a tenth of the relaxation time of a bath of type rescaling, which acts at the ends of "
-      "epochs";
+      "but at most the time in which a sphere flies four times the longest edge, and a tenth of the relaxation time of "
+      "a bath of type rescaling, which acts at the ends of epochs";
   Parameter lengthen{.name = "lengthen",
                      .type = Parameter::Type::boolean,
                      .fallback = "none",

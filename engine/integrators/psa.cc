@@ -102,7 +102,7 @@ class PrimitiveSplitting : public Integrator<D> {
   bool resolve_contacts(System<D>& system, double time) {
     auto& p = system.particles;
     auto& scan = core_->scan();
-    if (!system.decomposition.any(!scan.quiet(p.x, p.v))) return false;
+    if (!system.decomposition.any(!scan.quiet(time, p.x, p.v))) return false;
     system.decomposition.need_all();
     scan.resolve(time, p.x, p.v,
                  [&](const Touch<D>& touch) { return resolve_contact<D>(touch.key, touch.normal, system.box, p); });

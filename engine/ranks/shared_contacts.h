@@ -30,11 +30,9 @@ bool commit_contacts(const System<D>& system, std::span<const Contact<D>> found,
   std::vector<Contact<D>> own;
   for (Contact<D> contact : found) {
     if (!p.owns(contact.key.lo)) continue;
-    tally.record<D>(contact, nullptr);
-    if (!log) continue;
     contact.key.lo = p.id_of(contact.key.lo);
     if (contact.key.kind == EventKind::pair) contact.key.hi = p.id_of(contact.key.hi);
-    own.push_back(contact);
+    tally.record(contact, log ? &own : nullptr);
   }
   tally = system.decomposition.sum(tally);
   if (tally.contacts() > most) return false;

@@ -43,17 +43,20 @@ std::vector<typename EventCore<D>::Changed> WindowPaths<D>::finish() {
   return other;
 }
 
+/// The key of the event with an entry in the log.
+template <int D>
+EventKey<D> WindowPaths<D>::key_of(std::uint32_t entry) const {
+  const auto& event = trace_.event_of(entry);
+  const Id lo = trace_.before(entry / 2 * 2).id, hi = trace_.before(entry / 2 * 2 + 1).id;
+  return event.slot[1] == kNoEntry
+             ? EventKey<D>{event.time, event.generation, EventKind::wall, lo, event.partner}
+             : pair_key<D>(event.time, event.generation, lo, hi, flights_.packing().image(event.partner));
+}
+
 /// Node k of a path, read from the log; `entries`: the sphere's entries.
 template <int D>
 Node<D> WindowPaths<D>::logged(Slot i, std::span<const std::uint32_t> entries, std::size_t k) const {
   const bool last = k == entries.size();
-  const auto key_of = [&](std::uint32_t entry) {
-    const auto& event = trace_.event_of(entry);
-    const Id lo = trace_.before(entry / 2 * 2).id, hi = trace_.before(entry / 2 * 2 + 1).id;
-    return event.slot[1] == kNoEntry
-               ? EventKey<D>{event.time, event.generation, EventKind::wall, lo, event.partner}
-               : pair_key<D>(event.time, event.generation, lo, hi, flights_.packing().image(event.partner));
-  };
   return {.after = last ? flights_[i] : trace_.before(entries[k]),
           .key = k == 0 ? EventKey<D>{} : key_of(entries[k - 1]),
           .spin = last ? flights_.spin(i) : trace_.spin_before(entries[k])};
@@ -120,14 +123,20 @@ bool WindowPaths<D>::matches(Slot g) const {
 template <int D>
 ContactTally WindowPaths<D>::tally() const {
   ContactTally tally;
-  for (const auto& event : trace_.events()) {
-    if (const Slot lo = event.slot[0]; !ownership_.owns(lo) || paths_.has(lo)) continue;
-    if (event.slot[1] != kNoEntry) {
-      tally.add_pair(event.exchange.template unpacked<D>(nullptr, event.time), event.overlap);
+  for (std::uint32_t n = 0; n < trace_.events().size(); ++n) {
+    const auto& event = trace_.events()[n];
+    const auto [lo, hi] = event.slot;
+    if (!ownership_.owns(lo) || paths_.has(lo)) continue;
+    const bool pair = hi != kNoEntry;
+    if (pair) {
+      tally.add_pair(event.exchange.template unpacked<D>(nullptr, event.time));
     } else {
       const Wall<D> wall = box_.wall(event.partner);
-      tally.add_wall(wall.number, event.exchange.unpacked(&wall, event.time), event.overlap);
+      tally.add_wall(wall.number, event.exchange.unpacked(&wall, event.time));
     }
+    tally.note_overlap(event.overlap, [&] {
+      return Overlap(event.overlap, pair ? flights_.contact_distance(lo, hi) : flights_.radius(lo), key_of(2 * n));
+    });
   }
   for (const Slot i : paths_.slots()) {
     if (!ownership_.owns(i)) continue;

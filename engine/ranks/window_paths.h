@@ -112,6 +112,7 @@ class WindowPaths {
   }
   /// The bytes of a node in a message: without the spin if no contact is rough.
   std::size_t node_bytes() const { return offsetof(Node<D>, spin) + (flights_.rough() ? sizeof(Spin<D>) : 0); }
+  EventKey<D> key_of(std::uint32_t entry) const;
   Node<D> logged(Slot i, std::span<const std::uint32_t> entries, std::size_t k) const;
 
   const Box<D>& box_;

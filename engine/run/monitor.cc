@@ -28,8 +28,16 @@ constexpr double kLargestEnergyGrowth = 1e10;
 /// 1e-16 of the box; potentials 10⁴ times steeper than the box is long make 1e-12 of this. The limit is six digits
 /// above this, and still far below the error of a second-order method.
 constexpr double kLargestEnergyJump = 1e-6;
-/// Depth relative to the contact distance. The methods leave 1e-12; the box may be 10⁹ diameters long.
+/// Depth relative to the contact distance.
 constexpr double kDeepestOverlap = 1e-6;
+
+/// The length of an overlap that rounding may cause, relative to the largest coordinate and the longest path in a slab.
+/// Both are rounded by half an ulp, 2^-53, at each operation: positions at the start, the time of the contact, and the
+/// place there, of two spheres and an image in each of D axes, less than 2^-49 together. The gap tolerance is 4 ulp of
+/// the box, up to 2^-50 of it. This is sixteen times the tolerance; a contact in a box of 10⁶ diameters must be right
+/// to 1.4e-8 diameters then.
+constexpr double kRoundingOfPositions = 0x1p-46;
+
 /// Replaces an id if there is none; the smallest id of all ranks is found as the largest negative one.
 constexpr double kNoId = -std::numeric_limits<double>::infinity();
 
@@ -202,7 +210,10 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
       info_.shadow && (due || s.steps == s.start_steps + 1 || system_.size() <= kShadowAtEveryStep);
   Waiting& slab = waiting_.emplace_back(observed(s.end_time, system_.particles, &integrator, with_shadow));
   slab.elapsed = elapsed;
-  if (info_.hard_cores) slab.own.overlaps = overlaps();
+  OverlapTally& at_contacts = statistics_.counters;
+  slab.own.overlaps = at_contacts;
+  at_contacts.worst = {};
+  if (info_.hard_cores) slab.own.overlaps.add(overlaps(elapsed));
   if (soon || with_shadow || waiting_.size() == kMostWaiting) settle();
   sample(s.end_time, system_.particles);
   if (due) show(shot_, false);
@@ -290,13 +301,7 @@ void Monitor<D>::take(const Waiting& slab, const Sums& sums) {
   if (s.max_momentum_error)
     s.max_momentum_error =
         std::max(*s.max_momentum_error, (shot_.momentum - Vec<D>(account_.first_momentum.data())).norm());
-  const Overlaps& all = sums.overlaps;
-  s.counters.max_overlap = std::max(s.counters.max_overlap, all.depth());
-  if (all.depth() > kDeepestOverlap)
-    throw Error(Failure::numerical, "particles " + std::to_string(all.lo) + " and " + std::to_string(all.hi) +
-                                        " overlap, by " + short_text(all.depth()) +
-                                        " of their contact distance, at step " + std::to_string(shot_.step) +
-                                        ", time " + short_text(shot_.time) + "; use a smaller integrator.step");
+  note_overlap(slab, sums);
   account_.virial_time += slab.elapsed * account_.virial;
   const double path = slab.elapsed * 0.5 * (speed + account_.speed);
   account_.path += path;
@@ -305,6 +310,21 @@ void Monitor<D>::take(const Waiting& slab, const Sums& sums) {
     s.equilibrium = {*transient_end_, slab.shot.time};
     begin_means();
   }
+}
+
+/// Keeps the worst overlap, unless it may be rounding. Throws if it makes the run meaningless.
+template <int D>
+void Monitor<D>::note_overlap(const Waiting& slab, const Sums& sums) {
+  Statistics& s = statistics_;
+  s.counters.max_overlap = std::max(s.counters.max_overlap, sums.overlaps.max_overlap);
+  Overlap worst = sums.overlaps.worst;
+  const double size = std::max(system_.box.edges.maxCoeff(), sums.motion.farthest);
+  if (!(worst.length > kRoundingOfPositions * (size + sums.motion.fastest * slab.elapsed))) return;
+  worst.time += slab.shot.time - slab.elapsed;
+  if (worst.depth > kDeepestOverlap)
+    throw Error(Failure::numerical, overlap_text(worst, system_.box) + ", at step " + std::to_string(shot_.step) +
+                                        ", time " + short_text(worst.time) + "; use a smaller integrator.step");
+  if (!s.overlap || worst.depth > s.overlap->depth) s.overlap = worst;
 }
 
 /// The state of this rank's particles; `integrator` is null if they are not its state.
@@ -404,17 +424,19 @@ std::vector<WallLoad> Monitor<D>::wall_loads(double time) {
   return loads;
 }
 
-/// The overlaps of any two spheres that this rank sees: an independent check that no contact was missed.
+/// The overlaps of any two spheres that this rank sees, at this time in the slab: an independent check that no contact
+/// was missed.
 template <int D>
-Overlaps Monitor<D>::overlaps() {
-  Overlaps found;
+OverlapTally Monitor<D>::overlaps(double time) {
+  OverlapTally found;
   const auto look = [&](NeighbourList<D>& list, const Particles<D>& p) {
     for (const auto& pair : list.cover(p.x)) {
       const double sigma = p.radius[pair.i] + p.radius[pair.j];
       const double squared = (p.x[pair.i] - p.x[pair.j] + system_.box.shift(pair.image)).squaredNorm();
       if (squared >= sigma * sigma) continue;
-      const auto [lo, hi] = std::minmax({p.id_of(pair.i), p.id_of(pair.j)});
-      found.add({1, lo, hi, std::sqrt(squared), sigma});
+      const double depth = 1 - std::sqrt(squared) / sigma;
+      found.note_overlap(
+          depth, [&] { return Overlap(depth, sigma, pair_key<D>(time, 0, p.id_of(pair.i), p.id_of(pair.j), {})); });
     }
   };
   const Particles<D>& p = system_.particles;

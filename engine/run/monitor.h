@@ -11,7 +11,6 @@
 #include "engine/run/simulation.h"
 #include "engine/run/transient.h"
 #include "engine/search/neighbour_list.h"
-#include "engine/setup/placement.h"
 
 namespace carom {
 
@@ -90,7 +89,7 @@ class Monitor {
   struct Sums {
     MotionSums<D> motion;
     PotentialSums potential;
-    Overlaps overlaps;
+    OverlapTally overlaps;
     void add(const Sums& other) {
       motion.add(other.motion);
       potential.add(other.potential);
@@ -124,9 +123,10 @@ class Monitor {
   std::vector<WallLoad> wall_loads(double time);
   void count_from(const Snapshot<D>& shot);
   void add_to_series(const Waiting& slab, double path);
+  void note_overlap(const Waiting& slab, const Sums& sums);
   void guard(double energy_before, double magnitude_before);
   std::string fastest(const Particles<D>& state) const;
-  Overlaps overlaps();
+  OverlapTally overlaps(double time);
   const Particles<D>& all_particles(const Particles<D>& state);
 
   System<D>& system_;

@@ -128,7 +128,9 @@ struct Statistics {
   std::optional<double>
       max_shadow_energy_error;  ///< Verlet types; with more than 100 particles only at thermo rows and frames
   std::optional<double> max_momentum_error;  ///< if momentum is conserved (no walls, no fields): max |P − P₀|
-  double mean_pressure = 0;                  ///< over the whole run
+  /// The deepest overlap that is more than rounding, if there was one; its time is that of the run.
+  std::optional<Overlap> overlap;
+  double mean_pressure = 0;   ///< over the whole run
   double collision_rate = 0;  ///< 2 × pair collisions per unit time and particle: the rate for one sphere
   /// The mean time and the mean length of a sphere's flights between two pair collisions: N t/(2 collisions), and this
   /// time × the mean speed. The mean of |v| over all particles is computed at slab ends and averaged over time by the
@@ -150,8 +152,8 @@ struct Statistics {
   void archive(Archive& archive) {
     archive(steps, end_time, fraction_done, start_steps, start_time, counters, force_passes, energy_initial,
             energy_after_first_step, energy_final, first_step_error, energy_reference, energy_scale, tail_energy,
-            tail_pressure, max_energy_error, max_shadow_energy_error, max_momentum_error, mean_pressure, collision_rate,
-            mean_free_time, mean_free_path, equilibrium, series, wall_seconds, stopped_early);
+            tail_pressure, max_energy_error, max_shadow_energy_error, max_momentum_error, overlap, mean_pressure,
+            collision_rate, mean_free_time, mean_free_path, equilibrium, series, wall_seconds, stopped_early);
   }
 };
 

@@ -18,10 +18,12 @@ namespace {
 constexpr double kEpochOfRelaxation = 0.1;
 /// The events of a sphere in an epoch: starting an epoch costs a fifth of an event for each sphere.
 constexpr double kEventsOfEpoch = 40;
-/// How far the fastest sphere may fly in an epoch that is longer than the default [smallest diameter]. The time of an
-/// event and the position of its spheres are rounded to 2^-53 of the time and the path since the start of the epoch:
-/// together less than 1e-12 of the smallest contact distance.
+/// How far a sphere may fly in an epoch. The time of an event and the position of its spheres are rounded to 2^-53 of
+/// the time and the path since the start of the epoch. With the first limit [smallest diameter], for epochs that are
+/// longer than the default, these are together less than 1e-12 of the smallest contact distance. With the second one
+/// [longest edge] they are a few times the rounding of any position in the box, however small the spheres.
 constexpr double kFarthest = 4096;
+constexpr double kFarthestInBoxes = 4;
 /// In an epoch a sphere may become this many times faster than all were before: it gets up to twice the speed of a
 /// heavy sphere.
 constexpr double kFaster = 4;
@@ -55,7 +57,7 @@ double default_epoch(const System<D>& system) {
   if (twice_kinetic == 0 || mass == 0) return 1;
   const double thermal_speed = std::sqrt(twice_kinetic / (D * n * mass));
   const double rate = thermal_speed * contacts_a_length({D, n / system.box.volume(), filled, diameter, diameter});
-  const double farthest = std::min(300 * diameter, 4 * system.box.edges.minCoeff());
+  const double farthest = kFarthestInBoxes * system.box.edges.maxCoeff();
   // In equilibrium, where the lightest are the fastest.
   const double light_speed = std::sqrt(twice_kinetic / (D * n * lightest));
   double epoch = std::min(kEventsOfEpoch / rate, farthest / std::max(thermal_speed, light_speed));
@@ -100,7 +102,8 @@ double next_epoch(const System<D>& system, const PastEpoch& past) {
   }
   if (!system.interactions.empty()) return 0;
   fastest = std::max(fastest, 5 * std::sqrt(hottest / -minus_lightest));
-  double longest = std::min(kLonger * past.length, kFarthest * -minus_diameter / fastest);
+  const double farthest = std::max(kFarthest * -minus_diameter, kFarthestInBoxes * system.box.edges.maxCoeff());
+  double longest = std::min(kLonger * past.length, farthest / fastest);
   longest = std::min(longest, kEventsOfEpoch / past.events * past.length);
   const double count = Packing<D>(1, system.size()).largest(), came = boxes + 1;
   for (int k = 0; k < D; ++k) {

@@ -8,9 +8,9 @@
 namespace carom {
 
 /// Forty mean free times of the fluid at this density (Enskog's theory), but at most the time in which the lightest
-/// spheres move 300 diameters or cross the box four times in equilibrium, and less if light or fast ones could cross
-/// more boxes than can be counted; rounded to two digits; 1 if nothing moves. Longer epochs lose digits, because times
-/// and unwrapped positions grow.
+/// spheres move four times the longest edge in equilibrium, and less if light or fast ones could cross more boxes than
+/// can be counted; rounded to two digits; 1 if nothing moves. Longer epochs lose digits, because times and unwrapped
+/// positions grow.
 template <int D>
 double default_epoch(const System<D>& system);
 

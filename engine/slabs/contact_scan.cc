@@ -49,7 +49,13 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
   touching_.clear();
   widest_ = rest_.widest_gap();
   const auto note = [&](const EventKey<D>& key, const Vec<D>& normal, double gap, double sigma, double speed = 0) {
-    counters_->max_overlap = std::max(counters_->max_overlap, -gap / sigma);
+    counters_->note_overlap(-gap / sigma, [&] {
+      const Id lo = particles_.id_of(key.lo);
+      const bool pair = key.kind == EventKind::pair;
+      return Overlap(
+          -gap / sigma, sigma,
+          pair ? pair_key<D>(time, 0, lo, particles_.id_of(key.hi), {}) : EventKey<D>{time, 0, key.kind, lo, key.hi});
+    });
     touching_.push_back({.key = key, .normal = normal, .speed = speed, .gap = gap});
   };
   EventKey<D> key;

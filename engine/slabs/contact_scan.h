@@ -54,9 +54,9 @@ class ContactScan {
   /// they came to rest. Throws Error(Failure::numerical) beyond max_events.
   double resolve(double time, Positions<D> x, Vectors<D> v, const ApplyImpulse<D>& impulse);
 
-  /// Whether no contact approaches and no contact rests.
-  bool quiet(Positions<D> x, Positions<D> v) {
-    find_touching(0, x);
+  /// Whether no contact approaches and no contact rests, at this time in the slab.
+  bool quiet(double time, Positions<D> x, Positions<D> v) {
+    find_touching(time, x);
     sort_out(v);
     return approaching_.empty() && resting_.empty();
   }

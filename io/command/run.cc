@@ -177,7 +177,7 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
     outcome.peak_memory_bytes = peak_memory_bytes(accounts);
     if (statistics.stopped_early) outcome.status = "interrupted";
     log.say(report_text(deck, statistics, accounts));
-    for (const std::string& warning : warnings_about(deck, statistics)) {
+    for (const std::string& warning : warnings_about(deck, statistics, simulation.system().box)) {
       outcome.warnings.push_back(warning);
       log.warn(warning);
     }
@@ -193,10 +193,15 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
     progress.end_line();
     outcome.status = "failed";
     outcome.error = e.what();
+    const auto overlap = overlap_warning(statistics, simulation.system().box);
+    if (overlap) outcome.warnings.push_back(*overlap);
     if (files) files->close_after_failure();
     at_best(summary);
     at_best([&] { table.finish(); });
-    at_best([&] { log.error(e.what()); });
+    at_best([&] {
+      if (overlap) log.warn(*overlap);
+      log.error(e.what());
+    });
     throw;
   }
   if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)

@@ -103,7 +103,7 @@ void warn_of_state(const Deck& deck, System<D>& system, Problems& problems) {
     if (config.parameters.has("cutoff") && config.parameters.real("cutoff") > shortest / 2)
       problems.warning(config.at,
                        say("cutoff ", config.parameters.real("cutoff"), " is more than half the box, ", shortest / 2),
-                       "particles meet several images of each other; enlarge the box");
+                       "particles meet several images of each other, as in a crystal; enlarge the box for a fluid");
 
   for (std::size_t k = 0; k < system.interactions.size(); ++k)
     if (const auto caution = system.interactions[k]->caution(); !caution.what.empty())

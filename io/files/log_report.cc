@@ -138,8 +138,18 @@ std::optional<std::string> energy_warning(const Statistics& s, const IntegratorI
       std::max(first, later), first > later ? " after the first step" : "");
 }
 
-std::vector<std::string> warnings_about(const Deck& deck, const Statistics& s) {
+template <int D>
+std::optional<std::string> overlap_warning(const Statistics& s, const Box<D>& box) {
+  if (!s.overlap) return {};
+  return fmt::format(
+      "warning: {}, at time {:g}, which is more than rounding; take another integrator.step or integrator.type",
+      overlap_text(*s.overlap, box), s.overlap->time);
+}
+
+template <int D>
+std::vector<std::string> warnings_about(const Deck& deck, const Statistics& s, const Box<D>& box) {
   std::vector<std::string> all;
+  if (auto warning = overlap_warning(s, box)) all.push_back(std::move(*warning));
   if (auto warning = energy_warning(s, find_integrator(deck.integrator))) all.push_back(std::move(*warning));
   if (deck.plan.from_equilibrium && !s.equilibrium)
     all.emplace_back(
@@ -214,6 +224,10 @@ void ThermoTable<D>::write(const Snapshot<D>& s) {
   log_.note(row);
 }
 
+template std::optional<std::string> overlap_warning(const Statistics&, const Box<2>&);
+template std::optional<std::string> overlap_warning(const Statistics&, const Box<3>&);
+template std::vector<std::string> warnings_about(const Deck&, const Statistics&, const Box<2>&);
+template std::vector<std::string> warnings_about(const Deck&, const Statistics&, const Box<3>&);
 template class ThermoTable<2>;
 template class ThermoTable<3>;
 

@@ -22,9 +22,13 @@ std::string banner_text(const Deck& deck, std::size_t particles, int ranks);
 /// A warning if the energy error exceeds the energy itself (the step is far too long), or 1e-12 of it with an exact
 /// method.
 std::optional<std::string> energy_warning(const Statistics& statistics, const IntegratorInfo& method);
-/// All warnings at the end of a run: this one, and if no end of the initial transient was found that means were to
+/// A warning if spheres overlapped by more than rounding, in the run so far.
+template <int D>
+std::optional<std::string> overlap_warning(const Statistics& statistics, const Box<D>& box);
+/// All warnings at the end of a run: these two, and if no end of the initial transient was found that means were to
 /// begin at.
-std::vector<std::string> warnings_about(const Deck& deck, const Statistics& statistics);
+template <int D>
+std::vector<std::string> warnings_about(const Deck& deck, const Statistics& statistics, const Box<D>& box);
 
 /// How the run ended, its results, and the time spent by part: least, mean and most of several ranks.
 std::string report_text(const Deck& deck, const Statistics& statistics, std::span<const RankAccount> ranks);

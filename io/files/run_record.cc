@@ -89,7 +89,7 @@ void RunRecord<D>::close() {
   if (statistics.stopped_early) outcome_.status = "interrupted";
   Communicator alone;
   log_->note(report_text(deck_, statistics, accounts_of_all(alone, statistics)));
-  for (const std::string& warning : warnings_about(deck_, statistics)) {
+  for (const std::string& warning : warnings_about(deck_, statistics, simulation_.system().box)) {
     outcome_.warnings.push_back(warning);
     warn(warning);
   }
@@ -101,6 +101,10 @@ template <int D>
 void RunRecord<D>::fail(const std::string& why) {
   outcome_.status = "failed";
   outcome_.error = why;
+  if (const auto overlap = overlap_warning(simulation_.statistics(), simulation_.system().box)) {
+    outcome_.warnings.push_back(*overlap);
+    at_best([&] { warn(*overlap); });
+  }
   files_->close_after_failure();
   at_best([&] { write_summary(); });
   at_best([&] { table_->finish(); });

@@ -354,6 +354,7 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
     if (record) record->close();
   } catch (const std::exception& e) {
     if (record) record->fail(e.what());
+    warn(record ? &*record : nullptr);
     if (!started) {
       record_ = nullptr, live_ = nullptr;
       rest(at_work_->particles);
@@ -364,9 +365,19 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
     throw;
   }
   end();
-  if (record) warnings_ = record->warnings();
+  warn(record ? &*record : nullptr);
   state_ = std::move(state);
   interval_ = interval;
+}
+
+/// Keeps the warnings of a run with or without files.
+template <int D>
+void Session<D>::warn(const RunRecord<D>* record) {
+  warnings_.clear();
+  if (record)
+    warnings_ = record->warnings();
+  else if (const auto overlap = overlap_warning(live_ ? *live_ : statistics_, box_))
+    warnings_.push_back(*overlap);
 }
 
 /// The system between runs.

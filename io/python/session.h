@@ -119,7 +119,7 @@ class Session {
   const std::vector<Parameters>& baths() const { return baths_; }
   /// During a run: only in RunHooks::show.
   Averages averages() const;
-  /// Warnings of the last run about its files.
+  /// Warnings of the last run; without files only of overlaps.
   const std::vector<std::string>& warnings() const { return warnings_; }
   /// The directory of the files; empty: no files.
   std::string directory() const { return deck_ ? deck_->output.directory.string() : std::string(); }
@@ -136,6 +136,7 @@ class Session {
   bool reached(const Plan& plan) const;
   Bytes saved(const std::string& name, double interval) const;
   void rest(Particles<D>& particles);
+  void warn(const RunRecord<D>* record);
   void show(const Snapshot<D>& shot, const RunHooks& hooks);
   void describe(Plan& plan, bool begun, const RunHooks& hooks);
   void push(const Simulation<D>& run);

@@ -53,7 +53,7 @@ def test_deck(file, tmp_path):
     method, energy = deck["integrator"]["type"], summary["energy"]
     assert energy["reference"] > 0
     assert energy["max_abs_error"] <= (EXACT if method in EXACT_METHODS else APPROXIMATE) * energy["reference"]
-    assert summary["max_overlap"] <= 1e-12
+    assert summary["max_overlap"] <= 1e-12 and not any("overlap" in warning for warning in summary["warnings"])
     assert method == "verlet" or summary["events"]["sphere_sphere"] > 0
     assert check_h5md.violations(tmp_path) == []
     assert len(read_thermo(tmp_path)["time"]) >= 4

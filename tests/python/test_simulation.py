@@ -428,3 +428,56 @@ def test_rough_spheres_that_are_placed_and_written(tmp_path):
     again.run(time=3)
     whole.run(time=3)
     assert (again.spin == whole.spin).all() and again.energy_error < 1e-13
+
+
+@pytest.mark.parametrize("files", [False, True])
+def test_overlaps_are_a_warning(tmp_path, files):
+    """Three discs that fall onto each other and sink into each other, by 3.2e-7 diameters; at a longer step so far that the run fails."""
+    def pile(step):
+        sim = carom.Simulation(box=[5.3, 10], boundary="wall")
+        sim.add_particles(position=[[4.323, 1.303], [3.183, 2.956], [4.309, 2.451]], velocity=[[0.4, 0], [0.4, 0], [0.18, 0]],
+                          radius=0.5)
+        sim.add_contact("*", "*", restitution=0)
+        sim.add_force("uniform-field", acceleration=[0, -1])
+        sim.integrator("cva", step=step)
+        if files:
+            sim.output(tmp_path / str(step))
+        return sim
+
+    sim = pile(0.005)
+    sim.run(time=0.5)
+    assert sim.warnings == []
+    with pytest.warns(UserWarning, match="particles 0 and 2 overlap, by 3.20273e-07 of their contact distance, at time 2.00257") as caught:
+        sim.run(time=2.1)
+    assert len(caught) == len(sim.warnings) == 1
+    with pytest.warns(UserWarning, match="overlap, by 7.44347e-07 of their contact distance, at time 1.44"):
+        with pytest.raises(carom.NumericalError, match="overlap, by 1.07492e-06 .*, at step 73"):
+            pile(0.02).run(time=2.1)
+
+
+@pytest.mark.parametrize("method", ["verlet", "psa", "cva", "mcva", "cdda", "edda"])
+def test_a_crystal_has_one_energy_however_much_of_it_is_in_the_box(tmp_path, method):
+    """A simple cubic crystal of Lennard-Jones particles with 1, 8 and 27 of them in the box; the cutoff is longer than it."""
+    radius = {} if method == "verlet" else {"radius": 0.5}
+    cutoff, a, tail = 2.5, 1.1, {}
+    images = np.stack(np.meshgrid(*[np.arange(-3, 4) * a] * 3, indexing="ij"), -1).reshape(-1, 3)
+    r = np.linalg.norm(images, axis=1)
+    r = r[(r > 0) & (r < cutoff)]
+    energy = 0.5 * (4 * (r**-12 - r**-6) - 4 * (cutoff**-12 - cutoff**-6)).sum()
+    pressure = 0.5 * (48 * r**-12 - 24 * r**-6).sum() / (3 * a**3)
+    tail["energy"] = 8 * np.pi / a**3 * (cutoff**-9 / 9 - cutoff**-3 / 3)
+    tail["pressure"] = 32 * np.pi / 9 / a**6 * (cutoff**-9 - 1.5 * cutoff**-3)
+    for n in 1, 2, 3:
+        x = np.stack(np.meshgrid(*[np.arange(n) * a] * 3, indexing="ij"), -1).reshape(-1, 3)
+        sim = carom.Simulation(box=[n * a] * 3, boundary="periodic")
+        sim.add_particles(position=x, **radius)
+        sim.add_force("lennard-jones", epsilon=1.0, sigma=1.0, cutoff=cutoff, cut="shifted", tail=True)
+        sim.integrator(method, step=0.001)
+        sim.output(tmp_path / str(n), pressure_tensor_interval=0.001, thermo_interval=0.001)
+        sim.run(steps=2)
+        assert sim.energy / n**3 == pytest.approx(energy + tail["energy"], rel=1e-12)
+        assert sim.pressure == pytest.approx(pressure + tail["pressure"], rel=1e-12)
+        means = carom.open(tmp_path / str(n)).summary["pressure_tensor"]
+        for axis in "xx", "yy", "zz":
+            assert means[axis]["mean"] == pytest.approx(pressure + tail["pressure"], rel=1e-12)
+        assert abs(means["xy"]["mean"]) < 1e-12

@@ -11,6 +11,11 @@
 
 namespace carom::test {
 
+inline bool same(const Overlap& a, const Overlap& b) {
+  return a.depth == b.depth && a.length == b.length && a.time == b.time && a.kind == b.kind && a.lo == b.lo &&
+         a.hi == b.hi;
+}
+
 inline void expect_same(const Statistics& a, const Statistics& b) {
   EXPECT_EQ(a.steps, b.steps);
   EXPECT_EQ(a.end_time, b.end_time);
@@ -32,6 +37,8 @@ inline void expect_same(const Statistics& a, const Statistics& b) {
   EXPECT_EQ(x.sphere_sphere, y.sphere_sphere);
   EXPECT_EQ(x.sphere_wall, y.sphere_wall);
   EXPECT_EQ(x.max_overlap, y.max_overlap);
+  ASSERT_EQ(a.overlap.has_value(), b.overlap.has_value());
+  EXPECT_TRUE(!a.overlap || same(*a.overlap, *b.overlap));
   EXPECT_EQ(x.sweeps, y.sweeps);
   EXPECT_EQ(x.pieces, y.pieces);
   EXPECT_EQ(x.slabs_halved, y.slabs_halved);

@@ -187,7 +187,7 @@ std::unique_ptr<Interaction<D>> pair_term(std::string_view type, P potential, Pa
                                           const Parameters& parameters, const InteractionContext<D>& context) {
   if (!parameters.has("cutoff")) {
     refuse_cut_options(type, parameters);
-    return all_pairs<D>(type, potential, weight, parameters, context, "give 'cutoff', at most half the shortest edge");
+    return all_pairs<D>(type, potential, weight, parameters, context, "give 'cutoff'");
   }
   return cut_term<D>(type, potential, weight, cut_options(type, parameters), parameters, context);
 }

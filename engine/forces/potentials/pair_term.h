@@ -7,6 +7,9 @@
 //   Hessian product on i, and its negative on j:   w [2 U′ u + 4 U″ (d·u) d],   u = w_i − w_j
 //
 // Q is the divided difference of U; since ρ′ − ρ = (d + d′)·(d′ − d), the mean forces are a discrete gradient.
+//
+// If the cutoff is longer than a periodic edge, a particle meets its own images, at separations ±d that do not change:
+// ½ w_ii U for each, and so w_ii U for one of ±d. Their forces cancel; energy, virial and fluxes do not.
 
 #include <functional>
 #include <memory>
@@ -59,6 +62,13 @@ class PairTerm final : public Interaction<D> {
             for (int axis = 0; axis < D; ++axis) fluxes.heat[axis].add(current[axis]);
           }
         }
+    });
+    add_own_images([&](Id i, double w, const OwnImages& images) {
+      const Vec<D> current = w * (images.energy * v[i] + images.stress * v[i]);
+      for (int a = 0; a < D; ++a) {
+        for (int b = 0; b < D; ++b) fluxes.stress[D * a + b].add(w * images.stress(a, b));
+        fluxes.heat[a].add(current[a]);
+      }
     });
   }
   void add_forces(Positions<D> x, ForceSums<D>& forces, PotentialSums* sums) const override {
@@ -153,6 +163,31 @@ class PairTerm final : public Interaction<D> {
       return std::numeric_limits<double>::infinity();
   }
   const std::vector<double>* factors() const { return pair_factors(weight_, particles_); }
+  /// Sums for unit weight over a particle's own images, one of ±d.
+  struct OwnImages {
+    double energy = 0, magnitude = 0;                                          // Σ U, Σ |U|
+    Eigen::Matrix<double, D, D> stress = Eigen::Matrix<double, D, D>::Zero();  // Σ d_a F_b
+    double nearest = std::numeric_limits<double>::infinity();                  // |d| [length]
+  };
+  /// Calls add(particle, weight, images) for each own particle that meets its images.
+  void add_own_images(auto&& add) const {
+    if constexpr (requires { pairs_.takes_images_of(0); }) {
+      OwnImages images;
+      pairs_.for_each_own_image([&](const Vec<D>& d) {
+        const double rho = d.squaredNorm();
+        if (!(rho < cutoff_squared())) return;
+        const double energy = potential_.value(rho);
+        images.energy += energy;
+        images.magnitude += std::abs(energy);
+        images.stress += (-2 * potential_.derivative(rho)) * d * d.transpose();
+        images.nearest = std::min(images.nearest, std::sqrt(rho));
+      });
+      if (!(images.nearest < std::numeric_limits<double>::infinity())) return;
+      const auto* factor = factors();
+      for (Id i = 0; i < particles_.size(); ++i)
+        if (particles_.owns(i) && pairs_.takes_images_of(i)) add(i, factor ? (*factor)[i] * (*factor)[i] : 1, images);
+    }
+  }
   PairStep<D> step(PairStep<D> given) const {
     given.weight = factors();
     return given;
@@ -209,6 +244,16 @@ class PairTerm final : public Interaction<D> {
     sums->energy.add(totals.energy, sums->quantum);
     sums->magnitude.add(totals.magnitude, sums->quantum);
     sums->virial.add(totals.virial, 64 * sums->quantum);
+    add_own_images([&](Id i, double w, const OwnImages& images) {
+      const double virial = w * images.stress.trace();
+      if (!std::isfinite(w * images.magnitude + virial))
+        throw Error(Failure::numerical, "the force between particle " + std::to_string(particles_.id_of(i)) +
+                                            " and its own image, " + short_text(images.nearest) +
+                                            " apart, is too large or no number; use a larger box");
+      sums->energy.add(w * images.energy);
+      sums->magnitude.add(w * images.magnitude);
+      sums->virial.add(virial);
+    });
     return own;
   }
 

@@ -15,6 +15,9 @@
 //   ages(), renew(), add_listed_pairs(…)
 //                               if they exist: as in Interaction
 //   regroup()                   if it exists: the particles have been replaced by others
+//   for_each_own_image(visit), takes_images_of(i)
+//                               if they exist: visits the separations of any particle from its own images within reach,
+//                               one of ±d; and whether a particle and its images are pairs of this source
 // and
 //   reach(x), reach(block, ranks)           largest distance of partners; infinite: unlimited
 //   among(some)                             the source for a subset of the particles, or nothing if partners are
@@ -250,6 +253,32 @@ class PairsWithinCutoff {
   }
   double reach(Positions<D>) const { return cutoff_; }
   double reach(const Particles<D>&, Communicator&) const { return cutoff_; }
+
+  /// Throws Error(Failure::numerical) if there are too many.
+  template <class Visit>
+  void for_each_own_image(Visit&& visit) const {
+    constexpr double kMost = 1e8;
+    std::array<int, 3> last{};
+    double all = 1;
+    for (int k = 0; k < D; ++k) {
+      if (!box_.periodic(k)) continue;
+      const double boxes = std::floor(cutoff_ / box_.edges[k]);
+      all *= 2 * boxes + 1;
+      last[k] = static_cast<int>(std::min(boxes, kMost));
+    }
+    if (all > kMost)
+      throw Error(Failure::numerical, "too many of a particle's own images are within the cutoff of " +
+                                          short_text(cutoff_) + "; use a shorter cutoff");
+    Image<D> image{};
+    for (int a = 0; a <= last[0]; ++a)
+      for (int b = a > 0 ? -last[1] : 0; b <= last[1]; ++b)
+        for (int c = a > 0 || b > 0 ? -last[2] : 1; c <= last[2]; ++c) {
+          image[0] = a, image[1] = b;
+          if constexpr (D == 3) image[2] = c;
+          visit(box_.shift(image));
+        }
+  }
+  bool takes_images_of(Id i) const { return filter_.species.takes_images_of(i); }
 
   template <class Visit>
   void batches(const PairStep<D>& step, const Particles<D>& particles, double cutoff_squared, PairBatch& batch,

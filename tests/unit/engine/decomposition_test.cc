@@ -451,6 +451,23 @@ TEST(Decomposition, StepsThatTakeAllParticles) {
 TEST(Decomposition, WithoutCores) {
   for (const auto& scene : {yukawa(0.1), yukawa(0.3)}) compare<3>(scene, "verlet", 0.01, 150, 0);
 }
+/// A channel narrower than the cutoff, in which each disc meets its own images; charges of both signs.
+TEST(Decomposition, OwnImages) {
+  const auto channel = [] {
+    std::vector<Vec<2>> x, v;
+    for (int i = 0; i < 150; ++i) {
+      x.push_back({0.4 + 0.8 * (i / 2), 0.1 + 0.85 * (i % 2)});
+      v.push_back({std::sin(37.0 * i), std::cos(11.0 * i)});
+    }
+    auto system = test::make_system<2>({60, 1.7}, Boundary::periodic, x, v, std::vector<double>(150, 0.3));
+    for (Id i = 0; i < 150; ++i) system->particles.charge[i] = i % 3 == 0 ? -1.5 : 1;
+    test::add_interaction(
+        *system, "yukawa",
+        {{"amplitude", 1.0}, {"kappa", 1.0}, {"charges", true}, {"cutoff", 3.6}, {"cut", std::string("shifted")}});
+    return system;
+  };
+  for (const char* method : {"verlet", "psa", "edda"}) compare<2>(channel, method, 0.02, 12, method[0] == 'v' ? 0 : 20);
+}
 /// The final error of a run of free discs on each of this many ranks; 0: without ranks.
 std::string failure_of(const System<2>& start, const IntegratorInfo& info, const Given& given, int ranks) {
   std::vector<std::string> all(static_cast<std::size_t>(std::max(ranks, 1)));
@@ -495,6 +512,78 @@ TEST(Decomposition, TheDeepestOverlapIsFoundAcrossRanks) {
     const std::string message = failure_of(*system, info, {{"step", 1.0}}, ranks);
     EXPECT_TRUE(message.starts_with("particles 2 and 6 overlap, by 0.1 of their contact distance"))
         << ranks << ": " << message;
+  }
+}
+/// Resting piles that sink into each other; the last one so far that the run ends. All ranks name the same pair and
+/// time.
+TEST(Decomposition, PilesThatOverlapAreNamed) {
+  const auto pile = [](Vec<2> edges, std::vector<Vec<2>> x, std::vector<Vec<2>> v, double radius, double sideways,
+                       double restitution) {
+    const std::size_t n = x.size();
+    auto system =
+        test::make_system<2>(edges, Boundary::wall, std::move(x), std::move(v), std::vector<double>(n, radius));
+    test::set_law<2>(*system, {{"restitution", restitution}});
+    test::add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{sideways, -1.0}}});
+    return system;
+  };
+  const auto meeting = [&] {
+    return pile({5.3, 10}, {{4.323, 1.303}, {3.183, 2.956}, {4.309, 2.451}}, {{0.4, 0}, {0.4, 0}, {0.18, 0}}, 0.5, 0,
+                0);
+  };
+  const auto layers = [&] {
+    const Vec<2> rest = {0, 0};
+    auto system =
+        pile({4.2, 14}, {{0.577, 1.003}, {1.685, 0.988}, {2.85, 0.998}, {0.614, 2.096}, {1.736, 2.073}, {2.75, 2.112}},
+             {rest, rest, rest, rest, rest, rest}, 0.45, 0.2, 0.99);
+    test::set_law<2>(*system,
+                     {{"between", std::vector<std::string>{"*", "y-"}}, {"restitution", 0.5}, {"rest_speed", 0.01}});
+    return system;
+  };
+  const auto column = [&] {
+    return pile({4.2, 14}, {{0.574, 1.011}, {1.695, 1.02}, {2.824, 1.038}}, {{0, 0}, {0, 0}, {0, 0}}, 0.45, 0.2, 0.8);
+  };
+  struct Case {
+    Scene<2> scene;
+    std::string method;
+    double step, end, depth, time;
+    std::array<Id, 2> pair;
+    std::string fails = "";
+  };
+  for (const Case& c :
+       {Case{meeting, "cva", 0.005, 2.1, 3.2e-7, 2.0026, {0, 2}},
+        Case{column, "edda", 0.018, 13, 6.573e-7, 12.888, {1, 2}},
+        Case{column, "edda", 0.02, 13, 2.142e-5, 12.8995, {1, 2}, "particles 1 and 2 overlap, by 2.142"},
+        Case{layers, "edda", 0.02, 13, 1.2295e-6, 12.5543, {2, 5}, "particles 2 and 5 overlap, by 1.229"}}) {
+    SCOPED_TRACE(c.method + " " + std::to_string(c.step));
+    const auto run = [&](Communicator* ranks) {
+      auto system = c.scene();
+      if (ranks) system->decomposition.join(*ranks);
+      const auto simulation = test::make_run<2>(std::move(system), c.method, {.step = c.step, .end_time = c.end});
+      std::string failure;
+      try {
+        simulation->run();
+      } catch (const Error& e) {
+        failure = e.what();
+      }
+      return std::pair(simulation->statistics(), failure);
+    };
+    const auto [alone, failure] = run(nullptr);
+    EXPECT_NEAR(alone.counters.max_overlap, c.depth, 1e-3 * c.depth);
+    if (!c.fails.empty()) {
+      EXPECT_TRUE(failure.starts_with(c.fails)) << failure;
+    } else {
+      EXPECT_EQ(failure, "");
+      ASSERT_TRUE(alone.overlap);
+      EXPECT_EQ(alone.overlap->depth, alone.counters.max_overlap);
+      EXPECT_EQ(alone.overlap->lo, c.pair[0]);
+      EXPECT_EQ(alone.overlap->hi, c.pair[1]);
+      EXPECT_NEAR(alone.overlap->time, c.time, 1e-3);
+    }
+    test::ThreadRanks(2).run([&, one = alone, why = failure](Communicator& exchange) {
+      const auto [shared, same_failure] = run(&exchange);
+      EXPECT_EQ(same_failure, why);
+      if (why.empty()) test::expect_same(one, shared);  // a run that fails ends some steps later
+    });
   }
 }
 /// Two pairs, each on its own rank if there are several.

@@ -22,6 +22,28 @@ TEST(Epoch, IsFortyMeanFreeTimesInAnyDimension) {
   EXPECT_NEAR(spheres * 4 * sphere * at_sphere * speed, 40, 0.05 * 40);
 }
 
+/// As long as the way of forty mean free times is at most four edges, and that time beyond, however small the spheres:
+/// walls make no difference.
+TEST(Epoch, DoesNotDependOnTheSizeOfSmallSpheres) {
+  const double speed = std::sqrt(std::numbers::pi);
+  for (const Boundary boundary : {Boundary::periodic, Boundary::wall})
+    for (const double radius : {0.25, 1e-2, 1e-3, 1e-5, 1e-9}) {
+      auto system = test::hard_spheres<3>(5, 0.3);
+      system->box.edges = {200, 100, 100};
+      system->box.boundary.fill(boundary);
+      for (double& each : system->particles.radius) each = radius;
+      const double density = 500 / 2e6, forty = 40 / (16 * density * radius * radius * speed);
+      EXPECT_NEAR(default_epoch(*system) / std::min(forty, 800.0), 1, 0.06) << radius;
+      // In the next one the digits are lost that the box has lost already.
+      const double next = next_epoch(*system, {.length = 400, .events = 1, .boxes = 2});
+      double fastest = 0;
+      for (const auto& v : system->particles.v) fastest = std::max(fastest, v.norm());
+      if (boundary == Boundary::wall) {
+        EXPECT_NEAR(next * fastest, std::max(8192 * radius, 800.0), 1e-9) << radius;
+      }
+    }
+}
+
 /// The next epoch has forty events of a sphere, but is not too long for the images and the digits.
 TEST(Epoch, FollowsTheEventsOfTheLast) {
   const auto plain = test::hard_spheres<3>(5, 0.3);

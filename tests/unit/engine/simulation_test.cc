@@ -404,6 +404,28 @@ TEST(Simulation, OverlapsAreRelativeToTheContactDistance) {
   EXPECT_NEAR(run.statistics().counters.max_overlap, 0.1, 1e-14);
 }
 
+/// An overlap of 1e-9 diameters is more than rounding in a box of 20 diameters, but not in one of 10⁷.
+TEST(Simulation, OverlapsOfRoundingAreToldFromOthers) {
+  IntegratorInfo info = find_integrator("verlet");
+  info.hard_cores = true, info.smooth_forces = false;
+  const auto overlap = [&](double edge, double depth) {
+    const double x = edge - 5;
+    Simulation<2> run(test::make_system<2>({edge, 20}, Boundary::periodic, {{x, 5}, {x + 1.5, 5}},
+                                           {{0.5 + depth, 0}, {0, 0}}, {0.5, 0.5}),
+                      info, {{"step", 1.0}}, {.steps = 1});
+    run.run();
+    EXPECT_NEAR(run.statistics().counters.max_overlap, depth, 1e-16 * edge);
+    return run.statistics().overlap;
+  };
+  EXPECT_FALSE(overlap(20, 0.9e-11));
+  const auto found = overlap(20, 1.1e-11);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(std::tuple(found->lo, found->hi, found->time), std::tuple(0u, 1u, 1.0));
+  EXPECT_TRUE(overlap(20, 1e-9));
+  EXPECT_FALSE(overlap(1e7, 1e-9));
+  EXPECT_TRUE(overlap(1e7, 2e-7));
+}
+
 TEST(Simulation, ARunThatHasBlownUpEnds) {
   Simulation<2> later(oscillator(1), "verlet", {{"step", 3.0}}, {.steps = 1000});
   const std::string message = failure_of(later);

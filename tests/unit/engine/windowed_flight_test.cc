@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "engine/ranks/id_blocks.h"
+#include "tests/support/same_statistics.h"
 #include "tests/support/thread_ranks.h"
 #include "tests/unit/engine/event_cases.h"
 
@@ -91,6 +92,7 @@ void expect_the_same_however_divided(const Case<D>& c, std::size_t at_least,
       EXPECT_EQ(one.sphere_wall, many.sphere_wall) << what;
       EXPECT_EQ(one.collision_virial.value(), many.collision_virial.value()) << what;
       EXPECT_EQ(one.max_overlap, many.max_overlap) << what;
+      EXPECT_TRUE(test::same(one.worst, many.worst)) << what;
       EXPECT_EQ(one.work.value(), many.work.value()) << what;
     }
 }
@@ -113,6 +115,21 @@ TEST(WindowedFlight, ManySizes) {
       {.system = random_system<3>(300, {7, 7, 7}, {P, P, P}, 0.1, 1.0, 3), .slab = 0.05, .slabs = 2}, 700);
   expect_the_same_however_divided<2>(
       {.system = random_system<2>(120, {21, 21}, {P, W}, 0.15, 1.5, 4), .slab = 0.3, .slabs = 2}, 200);
+}
+
+/// In a box of 10⁷ diameters contacts are rounded to 1e-9 of a diameter, between spheres and at a wall: the longest
+/// overlap is the same one.
+TEST(WindowedFlight, OverlapsOfRounding) {
+  std::vector<Vec<2>> x, v;
+  for (int i = 0; i < 60; ++i) {
+    x.push_back({1e7 - 0.6 - 1.7 * (i / 6), 0.6 + 1.7 * (i % 6)});
+    v.push_back({std::sin(37.0 * i) + 0.5, std::cos(11.0 * i)});
+  }
+  const Case<2> c{.system = test::make_system<2>({1e7, 10}, W, x, v), .slab = 4, .slabs = 2};
+  Counters counters;
+  whole(c, std::numeric_limits<std::uint64_t>::max(), &counters);
+  EXPECT_GT(counters.worst.depth, kRoundingOfOverlaps);
+  expect_the_same_however_divided<2>(c, 150);
 }
 
 /// All spheres are in one line across the longest edge, at its end or in its middle: subdomains can have no sphere, or

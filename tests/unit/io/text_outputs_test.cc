@@ -360,11 +360,11 @@ TEST(Summary, SaysWhenTheTransientEnded) {
   deck.plan.from_equilibrium = true;
   Statistics s;
   EXPECT_TRUE(nlohmann::json::parse(summary_text(deck, {}, s)).at("equilibration").is_null());
-  EXPECT_EQ(warnings_about(deck, s).size(), 1u);
+  EXPECT_EQ(warnings_about(deck, s, Box<2>()).size(), 1u);
   s.equilibrium = {3.5, 8.0};
   EXPECT_EQ(nlohmann::json::parse(summary_text(deck, {}, s))["equilibration"],
             nlohmann::json::parse(R"({"transient_end": 3.5, "start": 8.0})"));
-  EXPECT_EQ(warnings_about(deck, s).size(), 0u);
+  EXPECT_EQ(warnings_about(deck, s, Box<2>()).size(), 0u);
 }
 
 TEST(Summary, SaysNullWhereThereIsNoNumber) {

@@ -57,6 +57,7 @@ struct Expected {
   };
   std::vector<Pair> pairs;     // pairs with forces or energies
   Real largest = 0;            // the largest share
+  Real largest_own = 0;        // the largest energy or virial of a particle and its own image
   Real largest_mean = 0;       // the largest share of mean forces
   bool bond_too_long = false;  // for a periodic box
   static constexpr Real kUnit = 256 * std::numeric_limits<double>::epsilon();
@@ -99,12 +100,22 @@ struct Expected {
       return;
     }
     const int side = 2 * images + 1;
+    const auto own = [&](Id i, const Image<D>& image) {
+      const double rho = squared(box.shift(image));
+      const double w = law.weight == Law::one ? 1 : law.weight == Law::masses ? p.mass[i] : p.charge[i];
+      if (w == 0 || image == Image<D>{} || !(rho < law.cutoff2)) return;
+      const Sized slope = Sized(-w * w) * law.slope(rho), value = Sized(0.5 * w * w) * law.value(rho);  // of ±d
+      sum(energy, value, 0);
+      sum(virial, slope * Sized(rho), 0);
+      sum(magnitude, {std::abs(value.v), value.size}, 0);
+      largest_own = std::max({largest_own, std::abs(value.v), std::abs(slope.v) * rho});
+    };
     for (Id i = 0; i < p.size(); ++i)
-      for (Id j = i + 1; j < p.size(); ++j)
+      for (Id j = i; j < p.size(); ++j)
         for (int n = 0; n < (D == 3 ? side * side * side : side * side); ++n) {
           Image<D> image;
           for (int k = 0, rest = n; k < D; ++k, rest /= side) image[k] = rest % side - images;
-          visit(i, j, image);
+          i == j ? own(i, image) : visit(i, j, image);
         }
   }
 
@@ -164,6 +175,11 @@ void expect_reason(const Error& error, const Expected<D>& expected, const Partic
   if (expected.bond_too_long && message.find("spans nearly half the periodic box") != std::string::npos) {
     EXPECT_TRUE(std::regex_search(message, named, std::regex("particles (\\d+) and (\\d+).*use a larger box")))
         << message;
+    return;
+  }
+  if (message.find("its own image") != std::string::npos) {
+    EXPECT_TRUE(std::regex_search(message, std::regex("particle \\d+ and its own image, .* apart.*use a larger box")));
+    EXPECT_GT(expected.largest_own, 1e300L) << message;
     return;
   }
   ASSERT_TRUE(std::regex_search(

@@ -71,6 +71,120 @@ TYPED_TEST(InDimension, TheVirialIsMinusTheDerivativeOfTheEnergyByTheScaleOfTheB
   });
 }
 
+/// Sums over a lattice of images, a particle's own among them, by loops over all images within the cutoff. The energy
+/// and the force of a pair are those of two particles alone in an open box.
+template <int D>
+struct LatticeSums {
+  double energy = 0, magnitude = 0;
+  Eigen::Matrix<double, D, D> stress = Eigen::Matrix<double, D, D>::Zero();
+  Vec<D> heat = Vec<D>::Zero();
+
+  LatticeSums(const Scene<D>& scene, const test::Case& law, double cutoff, const BondTable* excluded,
+              const std::vector<Vec<D>>& v) {
+    const auto& p = scene.particles;
+    Image<D> last{};
+    for (int k = 0; k < D; ++k)
+      if (scene.box.periodic(k)) last[k] = static_cast<int>(cutoff / scene.box.edges[k]) + 2;
+    for (Id i = 0; i < p.size(); ++i)
+      for (Id j = 0; j < p.size(); ++j) {
+        if (excluded && i != j && excluded->joins(i, j)) continue;
+        Scene<D> two(0, 100, Boundary::open, 0);
+        for (const Id one : {i, j}) {
+          two.particles.x.push_back(Vec<D>::Zero());
+          two.particles.mass.push_back(p.mass[one]);
+          two.particles.charge.push_back(p.charge[one]);
+          two.particles.species.push_back(p.species[one]);
+          two.particles.image.push_back({});
+          two.particles.radius.push_back(0.1);
+        }
+        const auto term = two.make(law.type, law.parameters);
+        const auto add = [&](const Vec<D>& d) {
+          if (d.norm() == 0) return;
+          const auto pair = test::sums<D>(*term, {d, Vec<D>::Zero()});
+          const Vec<D> force = pair.virial.value() / d.squaredNorm() * d;
+          energy += 0.5 * pair.energy.value();
+          magnitude += 0.5 * pair.magnitude.value();
+          stress += 0.5 * d * force.transpose();
+          heat += 0.5 * (pair.energy.value() * v[i] + force.dot(v[i]) * d);
+        };
+        for (int a = -last[0]; a <= last[0]; ++a)
+          for (int b = -last[1]; b <= last[1]; ++b)
+            for (int c = D == 3 ? -last[D - 1] : 0; c <= (D == 3 ? last[D - 1] : 0); ++c) {
+              Vec<D> d = p.x[i] - p.x[j];
+              d[0] += a * scene.box.edges[0], d[1] += b * scene.box.edges[1];
+              if constexpr (D == 3) d[2] += c * scene.box.edges[2];
+              add(d);
+            }
+      }
+  }
+};
+
+/// All edges are shorter than the cutoff, or all but one, which is walled.
+TYPED_TEST(InDimension, SumsInABoxShorterThanTheCutoffAreThoseOfALattice) {
+  constexpr int D = TypeParam::value;
+  using namespace std::string_literals;
+  std::vector<test::Case> laws = test::cases();
+  const auto ewald = std::pair{"form"s, ParameterValue("ewald"s)};
+  std::erase_if(laws, [&](const test::Case& law) {
+    return law.boundary != Boundary::periodic || law.type == "harmonic-bond" ||
+           std::ranges::find(law.parameters, ewald) != law.parameters.end();
+  });
+  EXPECT_EQ(laws.size(), 7u);
+  laws.push_back({"lennard-jones",
+                  Boundary::periodic,
+                  {{"epsilon", 1.0}, {"sigma", 0.5}, {"cutoff", 2.9}, {"cut", "shifted"s}, {"exclude", "bonded"s}}});
+  laws.push_back({"yukawa",
+                  Boundary::periodic,
+                  {{"amplitude", 2.0},
+                   {"kappa", 1.1},
+                   {"charges", true},
+                   {"cutoff", 2.2},
+                   {"cut", "force-shifted"s},
+                   {"species", std::vector<std::string>{"A", "B"}}}});
+  for (const test::Case& given : laws) {
+    const auto& parameters = given.parameters;
+    test::Case law = given;
+    const bool excludes = parameters.back().first == "exclude";
+    if (excludes) law.parameters.pop_back();
+    for (const bool walled : {false, true}) {
+      SCOPED_TRACE(given.type + (walled ? ", walled" : ""));
+      Scene<D> scene(10, 1.6, Boundary::periodic, 0.35);
+      scene.box.edges[0] = 2.1, scene.box.edges[1] = 1.75;
+      if (walled) scene.box.boundary[D - 1] = Boundary::wall, scene.box.edges[D - 1] = 4;
+      const auto bonds = excludes ? std::make_shared<BondTable>(test::kPeriodicBonds) : nullptr;
+      const auto v = scene.random_vectors(1);
+      const auto remake = [&](const Scene<D>& of) { return of.make(given.type, parameters, bonds); };
+      const auto term = remake(scene);
+      const LatticeSums<D> expected(scene, law, 2.9, bonds.get(), v);
+      const auto found = test::sums(*term, scene.particles.x);
+      const double scale = 1e-13 * expected.magnitude;
+      EXPECT_NEAR(found.energy.value(), expected.energy, scale);
+      EXPECT_NEAR(found.magnitude.value(), expected.magnitude, scale);
+      const double stress_scale = 1e-12 * (expected.magnitude + expected.stress.norm());
+      EXPECT_NEAR(found.virial.value(), expected.stress.trace(), stress_scale);
+      PairFluxes<D> fluxes;
+      term->add_fluxes(scene.particles.x, v, fluxes);
+      for (int a = 0; a < D; ++a) {
+        for (int b = 0; b < D; ++b)
+          EXPECT_NEAR(fluxes.stress[D * a + b].value(), expected.stress(a, b), stress_scale) << a << b;
+        EXPECT_NEAR(fluxes.heat[a].value(), expected.heat[a], 3 * stress_scale) << a;
+        // The stress is minus the derivative of the energy by the logarithm of an edge.
+        if (!scene.box.periodic(a)) continue;
+        const auto energy_at = [&](double factor) {
+          Scene<D> stretched = scene;
+          stretched.box.edges[a] *= factor;
+          for (auto& x : stretched.particles.x) x[a] *= factor;
+          return energy(*remake(stretched), stretched.particles.x);
+        };
+        const double h = 1e-4;
+        const double slope =
+            (8 * (energy_at(1 + h) - energy_at(1 - h)) - (energy_at(1 + 2 * h) - energy_at(1 - 2 * h))) / (12 * h);
+        EXPECT_NEAR(fluxes.stress[(D + 1) * a].value(), -slope, 1e-6 * (std::abs(slope) + expected.magnitude)) << a;
+      }
+    }
+  }
+}
+
 TYPED_TEST(InDimension, HessianProductsAreTheDerivativeOfTheForces) {
   constexpr int D = TypeParam::value;
   this->for_each_case([](Scene<D>& scene, const Interaction<D>& term) {
