@@ -90,6 +90,8 @@ void complete_values(Deck& deck, const System<D>& system, Problems& problems) {
   }
   if (ValueTable* placement = source.values.find("placement"); placement != nullptr && !source.placement.file.empty())
     placement->values.set("file", source.placement.file.string());
+  if (source.placement.type == "random" && !source.integrator->hard_cores && !source.placement.distance)
+    source.values.find("placement")->values.set("distance", default_distance<D>(source.particles(), system.box.volume()));
   if (deck.plan.step == 0) {
     choose_epoch(system, deck.integrator_parameters);
     deck.plan.step = deck.integrator_parameters.real("step");
@@ -200,7 +202,7 @@ std::vector<PairList> found_bonds(const Deck& deck, const System<D>& system) {
 }
 
 template <int D>
-std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const GivenState* given) {
+std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const GivenState* given, const Pause& pause) {
   const Deck::Source& source = *deck.source;
   if (deck.dimension != D) throw std::logic_error("build_system: the deck has another dimension");
   auto system = std::make_unique<System<D>>();
@@ -216,7 +218,7 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const G
     take_bonds(*deck.source, given->bonds);
     system->box.begin_step(given->time, 0);
   } else {
-    place_particles(source, *system);
+    place_particles(source, *system, pause);
     check_memory(source, &system->box, share);
     system->wrap();
     give_motion(source, *system);
@@ -238,12 +240,12 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const G
 
 template void fill_box(const Deck::Source&, System<2>&);
 template void make_interactions(const Deck::Source&, System<2>&, bool, Problems&);
-template std::unique_ptr<System<2>> build_system<2>(Deck&, Communicator*, const GivenState*);
+template std::unique_ptr<System<2>> build_system<2>(Deck&, Communicator*, const GivenState*, const Pause&);
 template std::vector<PairList> found_bonds(const Deck&, const System<2>&);
 
 template void fill_box(const Deck::Source&, System<3>&);
 template void make_interactions(const Deck::Source&, System<3>&, bool, Problems&);
-template std::unique_ptr<System<3>> build_system<3>(Deck&, Communicator*, const GivenState*);
+template std::unique_ptr<System<3>> build_system<3>(Deck&, Communicator*, const GivenState*, const Pause&);
 template std::vector<PairList> found_bonds(const Deck&, const System<3>&);
 
 }  // namespace carom

@@ -159,7 +159,11 @@ std::vector<TableSchema> make_schema() {
         {"simple-cubic", {}},
         {"hexagonal", {}},
         {"square", {}},
-        {"random", {}},
+        {"random",
+         {{"distance", real, "none", "length",
+           "with verlet, whose particles are points: the smallest distance between two of them; default: that at which "
+           "spheres of this diameter fill 0.19 (discs 0.27) of the box; 0: any",
+           Range::non_negative}}},
         {"compressed",
          {{"growth_rate", real, "0.1", "-",
            "speed at which the largest diameter grows, relative to the thermal speed; it is divided by the reduced "

@@ -63,8 +63,8 @@ Session<D>::Session(std::span<const double> edges, const std::vector<std::string
 }
 
 template <int D>
-Session<D>::Session(Deck& deck, const std::optional<GivenState>& given) {
-  system_ = build_system<D>(deck, nullptr, given ? &*given : nullptr);
+Session<D>::Session(Deck& deck, const std::optional<GivenState>& given, const Pause& pause) {
+  system_ = build_system<D>(deck, nullptr, given ? &*given : nullptr, pause);
   plan_ = deck.plan;
   box_ = system_->box;
   for (const auto& wall : deck.source->walls) walls_.push_back(wall.parameters);

@@ -105,7 +105,10 @@ void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
       return path == file ? std::optional(text) : read_text(path);
     });
     set_ends(deck, plan);
-    build_system<D>(deck);
+    build_system<D>(deck, nullptr, nullptr, [&] {
+      if (hooks.stop && hooks.stop(statistics_))
+        throw Error(Failure::interrupted, "stopped while the particles were placed; no file was written");
+    });
     deck_ = std::move(deck);
   } else {
     set_tables(*deck_, "contact", contacts_);  // laws and the bath may have changed since the last run

@@ -229,6 +229,9 @@ class Simulation:
         deck = {"format": 1, "system": system, "particles": placed + self._counted,
                 "placement": {"type": name_of("place", type), "seed": seed} | parameters,
                 "integrator": {"type": "free-flight"}, "run": {"collisions": 1}} | surroundings_of(self)
+        if old.method == "verlet":
+            deck |= {"integrator": {"type": "verlet", "step": 1.0}, "run": {"steps": 1},
+                     "particles": [{"display_radius" if key == "radius" else key: one[key] for key in one} for one in deck["particles"]]}
         if packing_fraction is not None:
             deck["placement"]["packing_fraction"] = packing_fraction
         session, texts, _ = _carom.from_deck("place", [], toml_text(deck))
