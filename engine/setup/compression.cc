@@ -63,8 +63,7 @@ class Compressor {
 
   bool insert(const std::vector<Id>& all) {
     scale_radii();
-    return insert_at_random<D>(box_, particles_.x, particles_.radius, all, options_.seed,
-                               options_.pause) == all.size();
+    return insert_at_random<D>(box_, particles_.x, particles_.radius, all, options_.seed, options_.pause) == all.size();
   }
 
   void scale_radii() {
@@ -97,8 +96,8 @@ class Compressor {
     double reached = 0;
     do {
       if (options_.pause) options_.pause();
-      reached = core_.run(length, {.counters = counters,
-                                   .collision_limit = std::min(counters.sphere_sphere + kBetweenPauses, limit)});
+      reached = core_.run(
+          length, {.counters = counters, .collision_limit = std::min(counters.sphere_sphere + kBetweenPauses, limit)});
     } while (reached < length && counters.sphere_sphere < limit);
     core_.fly_to(reached, particles_);
     for (std::size_t i = 0; i < particles_.size(); ++i) box_.wrap(particles_.x[i], particles_.image[i]);

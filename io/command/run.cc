@@ -109,7 +109,7 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
   Resumed* const continued = from && from->is_continued() ? from : nullptr;
   const Statistics& statistics = simulation.statistics();
   const auto lock = continued ? std::move(continued->lock) : std::make_unique<DirectoryLock>(directory);
-  const auto backup = continued ? std::nullopt : prepare_output_directory(directory);
+  const auto backup = continued ? std::nullopt : prepare_output_directory(directory, deck.output.overwrite);
   // The next checkpoint replaces the damaged one, not the good one.
   if (const auto last = directory / run_file::checkpoint; continued && continued->checkpoint->file() != last)
     rename_file(continued->checkpoint->file(), last);

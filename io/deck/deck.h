@@ -36,6 +36,7 @@ struct Units {
 struct OutputConfig {
   std::filesystem::path directory;
   std::optional<double> checkpoint_wall;      ///< wall time between checkpoints [s]; nullopt: only at the end
+  bool overwrite = false;                     ///< removes the files of an earlier run; false: keeps them
   double sample_start = 0;                    ///< simulated time of the first sample of the observables
   std::vector<ObservableConfig> observables;  ///< the observables with an interval
   std::optional<Units> units;                 ///< nullopt: reduced units

@@ -489,6 +489,7 @@ class Interpreter {
     table->read<double>("thermo_interval", deck_.plan.thermo_interval);
     table->read<double>("sample_start", deck_.output.sample_start);
     table->read<bool>("events", deck_.plan.events);
+    table->read<bool>("overwrite", deck_.output.overwrite);
     if (const auto* start = table->find<std::string>("start"); start != nullptr && *start == "equilibrated") {
       deck_.plan.from_equilibrium = true;
       if (deck_.plan.thermo_interval == 0)

@@ -100,12 +100,13 @@ void place_at_random(const Deck::Source& source, const std::vector<Id>& placed, 
   const std::string of = std::to_string(done + 1) + " of " + std::to_string(placed.size());
   const std::string jammed = short_text(kJammed<D>, 3);
   if (points)
-    refuse(source.placement.at, "random insertion found no place for particle " + of + " at the distance " +
-                                    short_text(largest) + " from all others",
+    refuse(source.placement.at,
+           "random insertion found no place for particle " + of + " at the distance " + short_text(largest) +
+               " from all others",
            "give a smaller placement.distance, or leave it out");
   refuse(source.placement.at,
-         "random insertion found no place for sphere " + of + " (packing fraction wanted: " +
-             std::to_string(packing_fraction<D>(box.volume(), radius)) + ")",
+         "random insertion found no place for sphere " + of +
+             " (packing fraction wanted: " + std::to_string(packing_fraction<D>(box.volume(), radius)) + ")",
          "take type = \"compressed\" or a lattice, a larger box or fewer spheres; insertion jams at a packing fraction "
          "of " +
              jammed);
@@ -116,12 +117,11 @@ void place_by_compression(const Deck::Source& source, System<D>& system, const P
   using End = typename Compression<D>::End;
   const PlacementConfig& placement = source.placement;
   const auto& radius = system.particles.radius;
-  Compression<D> done = compress<D>(
-      system.box, radius,
-      {.seed = placement.seed,
-       .growth_rate = placement.growth_rate,
-       .max_collisions = placement.max_collisions,
-       .pause = pause});
+  Compression<D> done = compress<D>(system.box, radius,
+                                    {.seed = placement.seed,
+                                     .growth_rate = placement.growth_rate,
+                                     .max_collisions = placement.max_collisions,
+                                     .pause = pause});
   if (done.reached()) {
     system.particles.x = std::move(done.x);
     return;

@@ -45,6 +45,8 @@ std::vector<Parameter> output_keys() {
   std::vector<Parameter> keys = {
       {"directory", text, "none", "-",
        "where the run writes its files, relative to the working directory; default: runs/ and the name of the deck"},
+      {"overwrite", boolean, "false", "-",
+       "true: the files of an earlier run in the directory are removed; false: they are moved to its backup.N"},
       {"frame_interval", real, "0.0", "time", "simulated time between frames of the trajectory; 0: first and last only",
        Range::non_negative},
       {"thermo_interval", real, "0.0", "time", "simulated time between rows of thermo.csv; 0: first and last only",

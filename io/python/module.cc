@@ -191,13 +191,14 @@ void bind(py::module_& module, const char* name) {
       .def("means",
            [](const S& session) {
              py::dict all;
-             const Blocking& series = session.statistics().series;
+             const Statistics& statistics = session.statistics();
              for (std::size_t k = 0; k < Statistics::mean_names.size(); ++k) {
-               const Estimate e = k < series.columns() ? series.estimate(k) : Estimate();
+               const Estimate e = statistics.estimate(k);
                py::dict entry;
                entry["mean"] = e.mean;
                entry["standard_error"] = e.error;
                entry["independent_samples"] = e.samples;
+               entry["needed_time"] = statistics.needed_time(e);
                all[Statistics::mean_names[k]] = entry;
              }
              return all;

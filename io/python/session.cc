@@ -136,7 +136,7 @@ void Session<D>::add_particles(const Columns& columns) {
     }
     system_->check();
     if (columns.inertia != 0) set_inertia(columns.species, columns.inertia);
-    system_->wrap();
+    system_->wrap(Failure::initial_state);
     terms_.make(*system_);
   } catch (...) {
     resize(before);
@@ -151,7 +151,7 @@ template <int D>
 void Session<D>::set_position(std::span<const double> x) {
   set(&Particles<D>::x, x, "positions");
   std::ranges::fill(system_->particles.image, Image<D>{});
-  system_->wrap();
+  system_->wrap(Failure::initial_state);
 }
 
 template <int D>

@@ -117,9 +117,12 @@ void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
   }
   const Plan& of = deck_->plan;
   if (hooks.show && plan.thermo_interval > 0 && plan.thermo_interval != of.thermo_interval)
-    refuse("run: 'every' is " + short_text(plan.thermo_interval) + ", but the rows of thermo.csv come every " +
-           short_text(of.thermo_interval) +
-           "; the callback is called with each row: leave 'every' out, or give output() that thermo_interval");
+    refuse("run: 'every' is " + short_text(plan.thermo_interval) +
+           (of.thermo_interval > 0
+                ? ", but the rows of thermo.csv come every " + short_text(of.thermo_interval) +
+                      "; the callback is called with each row: leave 'every' out, or give output() that thermo_interval"
+                : ", but output() got no thermo_interval, so that thermo.csv has its first and its last row only; the "
+                  "callback is called with each row: give output() that thermo_interval"));
   plan.frame_interval = of.frame_interval;
   plan.thermo_interval = of.thermo_interval;
   plan.events = of.events;

@@ -12,7 +12,7 @@ import numpy as np
 from carom import files, formats, notebook, page, potentials
 from carom.checks import name_of, numbers, one_or_each, refuse_masked
 from carom.decks import deck_of, overrides, species_of, surroundings_of, system_of, toml_text, toml_value, write_deck
-from carom.errors import UsageError
+from carom.errors import CaromWarning, UsageError
 from carom.progress import Progress
 
 try:
@@ -78,7 +78,7 @@ class Simulation:
     def _warn(self, texts, level=3):
         self.warnings = list(texts)
         for text in texts:
-            warnings.warn(text, stacklevel=level)
+            warnings.warn(text.replace("warning: ", "", 1), CaromWarning, stacklevel=level)
 
     @classmethod
     def from_deck(cls, deck, set=None):
@@ -285,7 +285,7 @@ class Simulation:
         self._session.add_wall(given if normal is None else given | {"normal": numbers("add_wall", "normal", normal)})
 
     def add_contact(self, one, other, **parameters):
-        """Sets the law of contacts between two species, or between a species and a wall ("x-", or its name). "*" stands for all of them.
+        """Sets the law of contacts between two species, or between a species and a wall ("x-", or its name). "*" stands for all species and all walls.
         Add species and walls first; a later law replaces an earlier one. Between two runs, the second one continues the first.
 
         Parameters are those of [[contact]] in decks: restitution, tangential, friction, rest_speed; see
@@ -382,7 +382,8 @@ class Simulation:
     def means(self):
         """Means over time with their standard errors, up to now: ["pressure"]["mean"], ["standard_error"], ["independent_samples"]; also
         of temperature, potential, collision_rate, mean_free_time and mean_free_path. Each step, or epoch of free flight, is a sample. A
-        standard error is NaN if there are fewer than eight independent blocks of samples."""
+        standard error is NaN if there are fewer than eight independent blocks of samples; ["needed_time"] is then the time to which the
+        run must go at least, at the correlations seen so far."""
         return self._session.means()
 
     def integrator(self, type, **parameters):
