@@ -32,10 +32,15 @@ Vec<D> vector_at(std::span<const double> values, std::size_t i) {
 
 template <class T>
 void need_finite(std::span<const T> rows, const char* what) {
-  for (std::size_t i = 0; i < rows.size(); ++i)
+  for (std::size_t i = 0; i < rows.size(); ++i) {
     if (!rows[i].allFinite())
       throw Error(Failure::initial_state, std::string(what) + ": those of particle " + std::to_string(i) +
                                               " are not finite; give finite numbers");
+    for (const double each : rows[i])
+      if (const std::string error = beyond_limits(each); !error.empty())
+        throw Error(Failure::initial_state,
+                    std::string(what) + ": a number of particle " + std::to_string(i) + " " + error);
+  }
 }
 
 }  // namespace
@@ -135,6 +140,13 @@ void Session<D>::add_particles(const Columns& columns) {
         all.spin[id] = Eigen::Map<const Spin<D>>(columns.spin.data() + i * Spin<D>::SizeAtCompileTime);
     }
     system_->check();
+    for (const auto& [what, numbers] : {std::pair{"position", columns.x},
+                                        {"velocity", columns.v},
+                                        {"radius", columns.radius},
+                                        {"charge", columns.charge}})
+      for (const double each : numbers)
+        if (const std::string error = beyond_limits(each); !error.empty())
+          throw Error(Failure::initial_state, std::string("add_particles: a number in '") + what + "' " + error);
     if (columns.inertia != 0) set_inertia(columns.species, columns.inertia);
     system_->wrap(Failure::initial_state);
     terms_.make(*system_);

@@ -28,6 +28,27 @@ except KeyboardInterrupt:
 """
 
 
+PLACEMENT = """
+import carom
+sim = carom.Simulation(dimension=3, boundary="periodic")
+sim.add_particles(count=300000, temperature=1.0, radius=0.5)
+try:
+    print("ready", flush=True)
+    sim.place("random", packing_fraction=0.375)
+except KeyboardInterrupt:
+    print(len(sim))
+"""
+
+
+def test_ctrl_c_ends_a_placement():
+    """It would take hours; the simulation stays as it was."""
+    with subprocess.Popen([sys.executable, "-c", PLACEMENT], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "ready\n"
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=60)[0] == "0\n" and process.returncode == 0
+
+
 @pytest.mark.parametrize("make, ahead, more", [
     ("five_springs()", 1.005, ""), ("gas()", 10.0, ""), ("gas(4096, step=1000)", 10.0, ""),
     ("five_springs()", 1.0, ", every=0.05, callback=lambda s: s.energy")])

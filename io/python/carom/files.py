@@ -38,7 +38,7 @@ def reading(path):
     except FileError:
         raise
     except BlockingIOError as error:
-        raise FileError(f"{path}: a process is writing this file; wait for its end, or copy the file") from error
+        raise FileError(f"{path}: a process is writing this file faster than it can be read; wait for its end") from error
     except UnicodeDecodeError as error:
         raise FileError(f"{path}: is not a text file") from error
     except OSError as error:

@@ -343,7 +343,8 @@ class Simulation:
         [output] in decks: frame_interval, events, rdf_interval, sk_interval, msd_interval, profile_interval,
         transport_interval, pressure_tensor_interval, start, sample_start, checkpoint_wall, units, … (`carom schema`). Each
         run() ends with a checkpoint, from which from_run() and `carom run --continue` continue. Begins a new run, at time
-        0; the files of an earlier run in the directory are moved to its backup.N.
+        0; the files of an earlier run in the directory are moved to its backup.N, or removed with
+        overwrite=True.
 
             sim.output("runs/fluid", thermo_interval=0.1, frame_interval=1.0, rdf_interval=0.1)
             sim.run(time=100)
