@@ -302,17 +302,17 @@ IMPOSSIBLE_STATES = {
         changed("box = [6.0, 6.0, 6.0]", "box = [8e-9, 8e-9, 8e-9]", FLUID.replace('"fcc"', '"random"')),
         ["the largest diameter is 1, and the box is 8e-09 long on axis 0", "enlarge the box"]),
     "no room for points": (
-        lennard_jones("cutoff = 2.0").replace('"fcc"', '"random"\ndistance = 3.0'),
+        lennard_jones("cutoff = 2.0").replace('"fcc"', '"random"\ndistance = 3.0').replace("collisions", "steps"),
         ["random insertion found no place for particle", "at the distance 3 from all others", "give a smaller placement.distance"]),
     "a distance beyond the box": (
-        lennard_jones("cutoff = 2.0").replace('"fcc"', '"random"\ndistance = 7.0'),
+        lennard_jones("cutoff = 2.0").replace('"fcc"', '"random"\ndistance = 7.0').replace("collisions", "steps"),
         ["placement.distance is 7, and the box is 6 long on axis 0", "give a smaller one"]),
     "a position 3e9 boxes away": (
         changed('["wall", "wall"]', '["periodic", "wall"]').replace("[5.0, 5.0]]", "[3e10, 5.0]]"),
         ["deck.toml:9:1: ", "particle 1 is more than 2147483647 periodic boxes away", "give a position in the box"]),
     "a rescaling bath of particles at rest": (
         FLUID.replace("temperature = 1.0", "temperature = 0.0") + '[[bath]]\ntype = "rescaling"\ntemperature = 1.0\nrate = 1.0\n',
-        ["deck.toml:24:1: ", "all particles are at rest", "andersen"]),
+        ["deck.toml:22:1: ", "a rescaling bath multiplies velocities, and all particles are at rest", "andersen"]),
     "chains through vacancies": (
         CHAINS.replace("count = 64", "count = 63"),
         ["deck.toml:14:1: ", "type = \"simple-cubic\" does not look at bonds: the longest bond is", "its rest length is 1.5", "32 kT"]),
