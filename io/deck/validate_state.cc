@@ -29,7 +29,14 @@ std::string plural(std::size_t n, const std::string& one, const std::string& man
 template <int D>
 void check_box(const Deck::Source& source, const System<D>& system, Problems& problems) {
   const auto radius = system.decomposition.radii();
-  const double diameter = 2 * *std::max_element(radius.begin(), radius.end());
+  const auto [smallest, largest] = std::ranges::minmax(radius);
+  const double diameter = 2 * largest, rounded = system.box.gap_tolerance()(0);
+  constexpr double kDeepest = 1e-6;  // [contact distance], an overlap that ends the run
+  if (rounded > kDeepest * smallest)
+    problems.error(source.box,
+                   say("distances in a box of ", short_text(system.box.edges.maxCoeff()), " are known to ",
+                       short_text(rounded, 2), " only, and the smallest radius is ", short_text(smallest)),
+                   "shorten the longest edge; the rounding of positions would make spheres overlap");
   for (int k = 0; k < D; ++k) {
     const double edge = system.box.edges[k];
     if (!system.box.periodic(k) || edge >= diameter - system.box.gap_tolerance()(diameter)) continue;

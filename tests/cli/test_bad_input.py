@@ -298,6 +298,9 @@ IMPOSSIBLE_STATES = {
     "more spheres than box": (
         changed("box = [6.0, 6.0, 6.0]", "box = [2.0, 2.0, 2.0]", FLUID),
         ["of the box", "enlarge the box"]),
+    "a box too large for the digits of positions": (
+        changed("box = [10.0, 10.0]", "box = [10.0, 1e20]"),
+        ["deck.toml:6:7: ", "distances in a box of 1e+20 are known to 6.6e+04 only, and the smallest radius is 0.5", "shorten the longest edge"]),
     "spheres wider than the box": (
         changed("box = [6.0, 6.0, 6.0]", "box = [8e-9, 8e-9, 8e-9]", FLUID.replace('"fcc"', '"random"')),
         ["the largest diameter is 1, and the box is 8e-09 long on axis 0", "enlarge the box"]),

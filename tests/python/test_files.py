@@ -188,6 +188,11 @@ def test_a_mean_without_an_error_says_how_long_to_run(tmp_path):
     assert sim.open().summary["means"]["temperature"]["needed_time"] == mean["needed_time"]
     log = (tmp_path / "run/run.log").read_text()
     assert "no standard error of: pressure, temperature, potential" in log and "a run to time 0.08 at least" in log
+    sim.run(steps=100)
+    walls = sim.open().summary["walls"]
+    assert {wall["collisions"] for wall in walls.values()} == {0}
+    for name in ("force_standard_error", "pressure_standard_error", "independent_samples"):
+        assert {wall[name] for wall in walls.values()} == {None}
     sim = gas(step=0.1)
     sim.run(time=20)
     assert sim.means["pressure"]["standard_error"] > 0 and np.isnan(sim.means["pressure"]["needed_time"])
