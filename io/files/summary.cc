@@ -95,11 +95,11 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
     add("work", tally.work.value());
     add("heat", tally.heat.value());
   }
-  for (auto& entry : json["walls"])
-    if (entry["collisions"] == 0)  // no hit says nothing about how rare hits are
-      for (const char* key : {"force_standard_error", "pressure_standard_error", "independent_samples"})
-        if (entry.contains(key)) entry[key] = nullptr;
-  if (json["walls"].is_null()) json.erase("walls");
+  if (json.contains("walls"))
+    for (Json& entry : json["walls"])
+      if (entry["collisions"] == 0)  // no hit says nothing about how rare hits are
+        for (const char* key : {"force_standard_error", "pressure_standard_error", "independent_samples"})
+          if (entry.contains(key)) entry[key] = nullptr;
   if (!outcome.branched_from.empty())
     json["branched_from"] = {{"checkpoint", outcome.branched_from}, {"step", s.start_steps}, {"time", s.start_time}};
   for (const SpeciesValue& value : outcome.species_values)
