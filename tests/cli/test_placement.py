@@ -168,10 +168,13 @@ def test_a_signal_ends_a_placement(overrides, tmp_path):
     sets = [part for override in overrides for part in ("--set", override)]
     with subprocess.Popen([CAROM, "run", write_deck(tmp_path, CROWD), "-o", tmp_path / "out", "--quiet", *sets],
                           stderr=subprocess.PIPE, text=True) as process:
-        while not handles(process, signal.SIGTERM):
-            time.sleep(0.01)
-        process.terminate()
-        said = process.communicate(timeout=100)[1]
+        try:
+            while not handles(process, signal.SIGTERM):
+                time.sleep(0.01)
+            process.terminate()
+            said = process.communicate(timeout=100)[1]
+        finally:
+            process.kill()
     assert process.returncode == 75 and said.endswith(STOPPED.format("SIGTERM")) and not (tmp_path / "out").exists()
 
 

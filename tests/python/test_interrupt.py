@@ -46,7 +46,10 @@ def test_ctrl_c_ends_a_placement():
         assert process.stdout.readline() == "ready\n"
         time.sleep(0.5)
         process.send_signal(signal.SIGINT)
-        assert process.communicate(timeout=60)[0] == "0\n" and process.returncode == 0
+        try:
+            assert process.communicate(timeout=60)[0] == "0\n" and process.returncode == 0
+        finally:
+            process.kill()
 
 
 @pytest.mark.parametrize("make, ahead, more", [
