@@ -81,11 +81,15 @@ void check_bath(const Deck::Source& source, const System<D>& system, Problems& p
                    "give the particles a temperature above 0, or take type = \"andersen\"");
 }
 
-/// The longest bond of each interaction that has bonds [length]; infinite: too long for a periodic box. Collective.
+/// The longest bond of an interaction [length]; infinite: too long for a periodic box. Collective.
 template <int D>
 double longest_bond(const Interaction<D>& term, const System<D>& system) try {
   const auto& p = system.particles;
-  return system.decomposition.joined() ? term.reach(p, system.decomposition.ranks()) : term.reach(p.x);
+  if (!system.decomposition.joined()) return term.reach(p.x);
+  Communicator& ranks = system.decomposition.ranks();
+  double longest = term.reach(p, ranks);
+  ranks.largest({&longest, 1});
+  return longest;
 } catch (const Error&) {
   return std::numeric_limits<double>::infinity();
 }
