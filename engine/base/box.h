@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -161,12 +163,20 @@ struct Box {
     return s;
   }
 
-  /// Brings a position back into [0, edge) along the periodic axes and counts the crossings in `image`.
-  void wrap(Vec<D>& x, Image<D>& image) const {
+  /// Brings a position back into [0, edge) along the periodic axes and counts the crossings in `image`. Throws
+  /// Error(failure) if the number of crossings does not fit into `image`. Positions that are not finite stay.
+  void wrap(Vec<D>& x, Image<D>& image, Failure failure = Failure::numerical) const {
+    constexpr double kMost = std::numeric_limits<std::int32_t>::max();
     for (int k = 0; k < D; ++k) {
       if (!periodic(k) || (x[k] >= 0 && x[k] < edges[k])) continue;
       const double crossings = std::floor(x[k] / edges[k]);
-      if (crossings == 0) continue;
+      if (crossings == 0 || !std::isfinite(crossings)) continue;
+      if (!(std::abs(image[k] + crossings) < kMost))
+        throw Error(failure,
+                    "a particle has crossed the periodic box " + short_text(std::abs(image[k] + crossings)) +
+                        " times along axis " + std::to_string(k) +
+                        "; the numbers of crossings have 32 bits: start it inside the box, enlarge the box, or "
+                        "end the run earlier");
       x[k] -= crossings * edges[k];
       image[k] += static_cast<std::int32_t>(crossings);
       if (x[k] >= edges[k]) {  // a tiny negative x rounds up to the edge itself

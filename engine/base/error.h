@@ -8,8 +8,8 @@
 
 namespace carom {
 
-/// What went wrong; the value is the exit code of the `carom` command.
-enum class Failure { deck = 2, initial_state = 3, numerical = 4, file = 5 };
+/// What went wrong; the value is the exit code of the `carom` command. `interrupted`: stopped on request.
+enum class Failure { deck = 2, initial_state = 3, numerical = 4, file = 5, interrupted = 75 };
 
 /// An error; the message says what happened, where, and what to do about it.
 class Error : public std::runtime_error {

@@ -68,9 +68,10 @@ struct System {
     fields.add("spin", particles.spin);
   }
 
-  /// Wraps all particles into the periodic box. Called only at the ends of slabs.
-  void wrap() {
-    for (std::size_t i = 0; i < particles.size(); ++i) box.wrap(particles.x[i], particles.image[i]);
+  /// Wraps all particles into the periodic box. Called only at the ends of slabs. Throws Error(failure) if a particle
+  /// has crossed it too often to count.
+  void wrap(Failure failure = Failure::numerical) {
+    for (std::size_t i = 0; i < particles.size(); ++i) box.wrap(particles.x[i], particles.image[i], failure);
   }
 
   /// Throws Error(Failure::initial_state) if arrays of the particles differ in length, positions or velocities are not

@@ -47,7 +47,14 @@ void rescale(System<D>& system, std::int64_t slab, double time, double length, C
     for (int k = 0; k < D; ++k) centre[k] = sum_over_all<D>(system, [&](Id i) { return p.mass[i] * p.v[i][k]; }) / mass;
   }
   const double before = kinetic_energy<D>(system, Vec<D>::Zero()), kinetic = kinetic_energy(system, centre);
-  if (!(kinetic > 0)) return;
+  if (!(kinetic > 0)) {
+    if (kinetic == 0 && bath.temperature_at(time) > 0 &&
+        std::ranges::none_of(system.box.options, [](const auto& wall) { return wall.moves(); }))
+      throw Error(Failure::numerical,
+                  "the particles have come to rest, and a rescaling bath cannot heat particles at rest, because it "
+                  "multiplies velocities; take type = \"andersen\"");
+    return;
+  }
   // The kinetic energy of the centre of mass counts as one of D N degrees of freedom, as in the column `temperature`.
   const std::size_t freedoms = D * system.moving();
   RandomStream random(bath.seed, RandomPurpose::rescaling, 0, kBlocksOfSlab * static_cast<std::uint64_t>(slab));

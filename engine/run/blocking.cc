@@ -92,6 +92,7 @@ void Blocking::merge() {
 
 Estimate Blocking::estimate(std::size_t column) const {
   Estimate found;
+  found.needed = static_cast<double>(kFewestBlocks);
   if (samples_ == 0) return found;
   const std::size_t blocks = weight_.size() / weights_, whole = samples_ / length_;
   const auto value = [&](std::size_t block) { return values_[block * columns_ + column]; };
@@ -120,9 +121,13 @@ Estimate Blocking::estimate(std::size_t column) const {
     correlation += partitions[k].chance;
     if (correlation <= largest_by_chance(partitions.size() - k)) chosen = k;
   }
+  const auto in_block = [&](std::size_t k) { return static_cast<double>(length_ << k); };  // samples
+  // If even the longest blocks are correlated, independent ones are longer.
+  found.needed = std::max(found.needed, static_cast<double>(kFewestBlocks) * in_block(chosen));
   if (chosen == partitions.size() || whole >> chosen < kFewestBlocks) return found;
+  found.needed = 0;
   if (whole >> (chosen + 1) >= kFewestBlocks) ++chosen;
-  const double length = static_cast<double>(length_) * static_cast<double>(std::uint64_t{1} << chosen);
+  const double length = in_block(chosen);
   const double number = static_cast<double>(samples_) / length;
   found.error = std::sqrt(number * partitions[chosen].variance) / std::abs(weights);
   const double* const s = &squares_[3 * column];

@@ -33,6 +33,8 @@ struct Estimate {
   double error = std::numeric_limits<double>::quiet_NaN();
   /// The number of independent samples that would have this standard error: the variance of the samples over error².
   double samples = std::numeric_limits<double>::quiet_NaN();
+  /// Where there is no error: the fewest samples with which there may be one, at the correlations seen so far.
+  double needed = 0;
 };
 
 class Blocking {

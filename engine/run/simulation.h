@@ -149,6 +149,19 @@ struct Statistics {
   double wall_seconds = 0;     ///< spent in the loop of run()
   bool stopped_early = false;  ///< should_stop has ended it
 
+  /// The estimate of a column of `series`; nothing but NaN if there is no such column.
+  Estimate estimate(std::size_t column) const {
+    return column < series.columns() ? series.estimate(column) : Estimate();
+  }
+  /// Where an estimate has no standard error: the time to which the run must go at least to give it one, at the
+  /// correlations seen so far. NaN if there is one, or nothing can be said.
+  double needed_time(const Estimate& estimate) const {
+    const auto samples = static_cast<double>(series.samples());
+    const double start = equilibrium ? equilibrium->start : start_time;
+    if (!(estimate.needed > samples) || samples == 0) return std::numeric_limits<double>::quiet_NaN();
+    return start + (end_time - start) * estimate.needed / samples;
+  }
+
   void archive(Archive& archive) {
     archive(steps, end_time, fraction_done, start_steps, start_time, counters, force_passes, energy_initial,
             energy_after_first_step, energy_final, first_step_error, energy_reference, energy_scale, tail_energy,

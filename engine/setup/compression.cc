@@ -7,7 +7,6 @@
 
 #include "engine/base/elementary.h"
 #include "engine/events/event_core.h"
-#include "engine/setup/placement.h"
 
 namespace carom {
 namespace {
@@ -15,6 +14,7 @@ namespace {
 constexpr double kTarget = 1 + 1e-13;  // final factor: a gap of rounding size, so that no spheres overlap
 // Z is measured once a slab. Growth into a tenth of the free volume raises Z ≈ 1/(1 − s/s_J) by a ninth meanwhile.
 constexpr double kFreePart = 0.1;
+constexpr std::uint64_t kBetweenPauses = 100'000;  // collisions, some tenths of a second
 constexpr double kMaxLength = 10;  // longest slab, in diameters at the thermal speed, for growth rates below 0.01
 // By free-volume theory s_J is 1/Z ahead. Above this Z, at 0.3 % from jamming, the theory is trusted to a factor of 5.
 constexpr double kJammedPressure = 300, kTooFar = 5;
@@ -63,7 +63,7 @@ class Compressor {
 
   bool insert(const std::vector<Id>& all) {
     scale_radii();
-    return insert_at_random<D>(box_, particles_.x, particles_.radius, all, options_.seed) == all.size();
+    return insert_at_random<D>(box_, particles_.x, particles_.radius, all, options_.seed, options_.pause) == all.size();
   }
 
   void scale_radii() {
@@ -92,8 +92,13 @@ class Compressor {
     const double most = n * std::min(expected, 1 + options_.max_collisions - result_.collisions);
     Counters counters;
     core_.load(particles_, Vec<D>::Zero(), length, growth);
-    const double reached =
-        core_.run(length, {.counters = counters, .collision_limit = static_cast<std::uint64_t>(most)});
+    const auto limit = static_cast<std::uint64_t>(most);
+    double reached = 0;
+    do {
+      if (options_.pause) options_.pause();
+      reached = core_.run(
+          length, {.counters = counters, .collision_limit = std::min(counters.sphere_sphere + kBetweenPauses, limit)});
+    } while (reached < length && counters.sphere_sphere < limit);
     core_.fly_to(reached, particles_);
     for (std::size_t i = 0; i < particles_.size(); ++i) box_.wrap(particles_.x[i], particles_.image[i]);
     result_.factor = reached == to_the_end ? kTarget : result_.factor * (1 + growth * reached);

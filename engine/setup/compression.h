@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "engine/base/box.h"
+#include "engine/setup/placement.h"
 
 namespace carom {
 
@@ -30,6 +31,7 @@ struct CompressionOptions {
   std::uint64_t seed = 1;
   double growth_rate = 0.1;     ///< growth rate of the largest diameter in a gas, over the thermal speed
   double max_collisions = 1e5;  ///< a particle, after which compression gives up
+  Pause pause{};                ///< may end the compression
 };
 
 template <int D>

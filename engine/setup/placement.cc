@@ -159,7 +159,9 @@ std::vector<int> distribute(std::size_t sites, std::span<const std::size_t> coun
 
 template <int D>
 std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<const double> radius,
-                             std::span<const Id> ids, std::uint64_t seed, std::uint64_t tries) {
+                             std::span<const Id> ids, std::uint64_t seed, const Pause& pause, std::uint64_t tries) {
+  constexpr std::uint64_t kTrialsBetweenPauses = 1024;
+  std::uint64_t trials = 0;
   std::vector<bool> waiting(x.size(), false);
   for (const Id i : ids) waiting[i] = true;
   SizedCells<D> cells(box, radius, {x.size(), Vec<D>::Zero(), box.edges});
@@ -174,6 +176,7 @@ std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<c
     RandomStream random(seed, RandomPurpose::position, i);
     bool free = false;
     for (std::uint64_t trial = 0; trial < tries && !free; ++trial) {
+      if (pause && ++trials % kTrialsBetweenPauses == 0) pause();
       for (int k = 0; k < D; ++k) {
         const double margin = box.walled(k) ? radius[i] : 0;
         x[i][k] = margin + random.uniform() * (box.edges[k] - 2 * margin);
@@ -302,7 +305,7 @@ template std::size_t for_each_site(Lattice, const Box<2>&, std::size_t, double,
 template std::vector<Vec<2>> lattice_sites(Lattice, const Box<2>&, std::size_t, double);
 template Vec<2> commensurate_edges<2>(Lattice, std::size_t, double);
 template std::size_t insert_at_random(const Box<2>&, std::span<Vec<2>>, std::span<const double>, std::span<const Id>,
-                                      std::uint64_t, std::uint64_t);
+                                      std::uint64_t, const Pause&, std::uint64_t);
 template Overlaps find_overlaps(const Box<2>&, std::span<const Vec<2>>, std::span<const double>, std::span<const char>,
                                 std::span<const char>);
 template Outsiders find_outsiders(const Box<2>&, std::span<const Vec<2>>, std::span<const double>,
@@ -319,7 +322,7 @@ template std::size_t for_each_site(Lattice, const Box<3>&, std::size_t, double,
 template std::vector<Vec<3>> lattice_sites(Lattice, const Box<3>&, std::size_t, double);
 template Vec<3> commensurate_edges<3>(Lattice, std::size_t, double);
 template std::size_t insert_at_random(const Box<3>&, std::span<Vec<3>>, std::span<const double>, std::span<const Id>,
-                                      std::uint64_t, std::uint64_t);
+                                      std::uint64_t, const Pause&, std::uint64_t);
 template Overlaps find_overlaps(const Box<3>&, std::span<const Vec<3>>, std::span<const double>, std::span<const char>,
                                 std::span<const char>);
 template Outsiders find_outsiders(const Box<3>&, std::span<const Vec<3>>, std::span<const double>,

@@ -52,12 +52,17 @@ Vec<D> commensurate_edges(Lattice lattice, std::size_t count, double volume);
 /// The group of each site: `counts[g]` sites, drawn at random, are in group g, the remaining ones in group −1.
 std::vector<int> distribute(std::size_t sites, std::span<const std::size_t> counts, std::uint64_t seed);
 
+/// Called now and then during long work, at least several times a second; it may throw to end the work.
+using Pause = std::function<void()>;
+
 /// Random sequential insertion (Widom, J. Chem. Phys. 44 (1966) 3888): sets x[i] for every i in `ids`, large spheres
 /// first, at random positions without overlap with walls or placed spheres (all spheres not in `ids` are placed).
-/// Returns the number of spheres placed; insertion ends when a sphere fails in `tries` trials.
+/// Returns the number of spheres placed; insertion ends when a sphere fails in `tries` trials. No diameter may exceed a
+/// periodic edge.
 template <int D>
 std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<const double> radius,
-                             std::span<const Id> ids, std::uint64_t seed, std::uint64_t tries = 20000);
+                             std::span<const Id> ids, std::uint64_t seed, const Pause& pause = {},
+                             std::uint64_t tries = 20000);
 
 /// Pairs closer than their contact distance by more than the gap tolerance (engine/base/wall.h), also through periodic
 /// images; pairs are ignored if `beyond` marks the sphere with the larger index, or `fixed` both.

@@ -58,6 +58,8 @@ bool Requests::stop_here(const Communicator& ranks) const {
   return stop_signal != 0 || (ranks.rank() == 0 && most_ && seconds_since(start_) >= *most_);
 }
 
+bool Requests::stops_this_rank() const { return stop_signal != 0 || (most_ && seconds_since(start_) >= *most_); }
+
 void Requests::checkpoint_is_written() {
   keep_signal = 0;
   last_checkpoint_ = Clock::now();

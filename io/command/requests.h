@@ -34,6 +34,8 @@ class Requests {
   Asked now_and_then(Communicator& ranks, std::uint64_t most = std::numeric_limits<std::uint64_t>::max());
   /// Whether this rank has received a request to stop.
   bool stop_here(const Communicator& ranks) const;
+  /// Whether this rank has received a signal to stop, or its own clock has reached the wall time.
+  bool stops_this_rank() const;
   /// A checkpoint has been written.
   void checkpoint_is_written();
   /// Why the run was stopped, in words: the signal's name, or --max-wall.

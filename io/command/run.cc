@@ -45,10 +45,14 @@ constexpr std::uint64_t kCallsWithinSteps = 32;
 
 /// The run of a deck, from its initial state or from a checkpoint. Throws Error. Collective.
 template <int D>
-Simulation<D> simulation_of(Deck& deck, Communicator& ranks, Resumed* from) {
+Simulation<D> simulation_of(Deck& deck, Communicator& ranks, const Requests& requests, Resumed* from) {
   std::optional<GivenState> given;
   if (from) given = state_of<D>(*from, deck);
-  auto system = build_system<D>(deck, ranks.size() > 1 ? &ranks : nullptr, given ? &*given : nullptr);
+  auto system = build_system<D>(deck, ranks.size() > 1 ? &ranks : nullptr, given ? &*given : nullptr, [&] {
+    if (requests.stops_this_rank())
+      throw Error(Failure::interrupted, deck.file.string() + ": stopped by " + requests.reason() +
+                                            " while the particles were placed; no file was written: start it again");
+  });
   const IntegratorInfo& info = find_integrator(deck.integrator);
   return Simulation<D>(std::move(system), info, info.make<D>(deck.integrator_parameters), deck.plan);
 }
@@ -101,11 +105,11 @@ template <int D>
 int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int ranks, Requests& requests,
              Resumed* from) {
   const auto& directory = deck.output.directory;
-  auto simulation = simulation_of<D>(deck, at_work, from);
+  auto simulation = simulation_of<D>(deck, at_work, requests, from);
   Resumed* const continued = from && from->is_continued() ? from : nullptr;
   const Statistics& statistics = simulation.statistics();
   const auto lock = continued ? std::move(continued->lock) : std::make_unique<DirectoryLock>(directory);
-  const auto backup = continued ? std::nullopt : prepare_output_directory(directory);
+  const auto backup = continued ? std::nullopt : prepare_output_directory(directory, deck.output.overwrite);
   // The next checkpoint replaces the damaged one, not the good one.
   if (const auto last = directory / run_file::checkpoint; continued && continued->checkpoint->file() != last)
     rename_file(continued->checkpoint->file(), last);
@@ -213,7 +217,7 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
 /// Runs the deck on a rank other than 0, without any output.
 template <int D>
 int run_beside(Deck& deck, Communicator& at_work, Requests& requests, Resumed* from) {
-  auto simulation = simulation_of<D>(deck, at_work, from);
+  auto simulation = simulation_of<D>(deck, at_work, requests, from);
   std::vector<std::unique_ptr<Observer<D>>> others;
   for (const auto& [info, parameters] : deck.output.observables) {
     others.push_back(info->template in<D>().make(simulation.system(), parameters, deck.output.sample_start));

@@ -19,6 +19,7 @@
 #include "engine/run/observable.h"
 #include "engine/run/simulation.h"
 #include "engine/run/state.h"
+#include "engine/setup/placement.h"
 
 namespace carom {
 
@@ -35,6 +36,7 @@ struct Units {
 struct OutputConfig {
   std::filesystem::path directory;
   std::optional<double> checkpoint_wall;      ///< wall time between checkpoints [s]; nullopt: only at the end
+  bool overwrite = false;                     ///< removes the files of an earlier run; false: keeps them
   double sample_start = 0;                    ///< simulated time of the first sample of the observables
   std::vector<ObservableConfig> observables;  ///< the observables with an interval
   std::optional<Units> units;                 ///< nullopt: reduced units
@@ -97,8 +99,10 @@ std::vector<PairList> found_bonds(const Deck& deck, const System<D>& system);
 
 /// Builds the initial state and the interactions. May complete defaults that depend on it (deck.plan.step for free
 /// flight, the box from the packing fraction) and appends warnings; deck.toml_text is final afterwards. A given state
-/// replaces the initial one; for a continued run nothing is checked and no warning repeated.
+/// replaces the initial one; for a continued run nothing is checked and no warning repeated. `pause` is called while
+/// particles are placed, and may throw.
 template <int D>
-std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks = nullptr, const GivenState* given = nullptr);
+std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks = nullptr, const GivenState* given = nullptr,
+                                        const Pause& pause = {});
 
 }  // namespace carom

@@ -53,6 +53,22 @@ void fill_particles(const Deck::Source& source, System<D>& system, Communicator*
   all.image.assign(n, Image<D>{});
 }
 
+/// Wraps all particles into the periodic box. Throws Error(Failure::initial_state).
+template <int D>
+void wrap_all(const Deck::Source& source, System<D>& system) {
+  Particles<D>& p = system.particles;
+  for (Id i = 0; i < p.size(); ++i) try {
+      system.box.wrap(p.x[i], p.image[i]);
+    } catch (const Error&) {
+      Problems problems;
+      problems.error(place_of(source, p.id_of(i)),
+                     "particle " + std::to_string(p.id_of(i)) + " is more than 2147483647 periodic boxes away, and " +
+                         "boxes are counted with 32 bits",
+                     "give a position in the box, [0, edge) along each axis, or near it");
+      problems.throw_errors(Failure::initial_state);
+    }
+}
+
 /// Velocities and spins as given, or drawn for the species that have a temperature of them.
 template <int D>
 void give_motion(const Deck::Source& source, System<D>& system) {
@@ -90,6 +106,9 @@ void complete_values(Deck& deck, const System<D>& system, Problems& problems) {
   }
   if (ValueTable* placement = source.values.find("placement"); placement != nullptr && !source.placement.file.empty())
     placement->values.set("file", source.placement.file.string());
+  if (source.placement.type == "random" && !source.integrator->hard_cores && !source.placement.distance)
+    source.values.find("placement")
+        ->values.set("distance", default_distance<D>(source.particles(), system.box.volume()));
   if (deck.plan.step == 0) {
     choose_epoch(system, deck.integrator_parameters);
     deck.plan.step = deck.integrator_parameters.real("step");
@@ -200,7 +219,7 @@ std::vector<PairList> found_bonds(const Deck& deck, const System<D>& system) {
 }
 
 template <int D>
-std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const GivenState* given) {
+std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const GivenState* given, const Pause& pause) {
   const Deck::Source& source = *deck.source;
   if (deck.dimension != D) throw std::logic_error("build_system: the deck has another dimension");
   auto system = std::make_unique<System<D>>();
@@ -216,9 +235,9 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const G
     take_bonds(*deck.source, given->bonds);
     system->box.begin_step(given->time, 0);
   } else {
-    place_particles(source, *system);
+    place_particles(source, *system, pause);
     check_memory(source, &system->box, share);
-    system->wrap();
+    wrap_all(source, *system);
     give_motion(source, *system);
   }
 
@@ -228,7 +247,7 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const G
   if (given && !given->branch) return system;
   complete_values(deck, *system, problems);
   problems.throw_errors(Failure::deck);
-  check_state(deck, *system, problems);
+  check_state(deck, *system, problems, given == nullptr);
   problems.throw_errors(Failure::initial_state);
   if (ranks && !system->decomposition.joined()) system->decomposition.join(*ranks);
   warn_of_state(deck, *system, problems);
@@ -238,12 +257,12 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const G
 
 template void fill_box(const Deck::Source&, System<2>&);
 template void make_interactions(const Deck::Source&, System<2>&, bool, Problems&);
-template std::unique_ptr<System<2>> build_system<2>(Deck&, Communicator*, const GivenState*);
+template std::unique_ptr<System<2>> build_system<2>(Deck&, Communicator*, const GivenState*, const Pause&);
 template std::vector<PairList> found_bonds(const Deck&, const System<2>&);
 
 template void fill_box(const Deck::Source&, System<3>&);
 template void make_interactions(const Deck::Source&, System<3>&, bool, Problems&);
-template std::unique_ptr<System<3>> build_system<3>(Deck&, Communicator*, const GivenState*);
+template std::unique_ptr<System<3>> build_system<3>(Deck&, Communicator*, const GivenState*, const Pause&);
 template std::vector<PairList> found_bonds(const Deck&, const System<3>&);
 
 }  // namespace carom

@@ -150,6 +150,15 @@ class Interpreter {
       problems_.error(source_.species.front().at, "all particles are fixed, and nothing would move",
                       "let some move: fixed = false");
     if (source_.integrator == nullptr) return;
+    if (const ValueTable* placement = values_.find("placement")) {
+      if (source_.integrator->hard_cores && placement->given("distance"))
+        problems_.error(placement->place("distance"), "'distance' is for points, which only 'verlet' has",
+                        "leave it out: spheres keep their diameters apart");
+      if (!source_.integrator->hard_cores && source_.placement.type == "compressed")
+        problems_.error(placement->place("type"),
+                        "'" + deck_.integrator + "' treats particles as points, which cannot be compressed",
+                        "take type = \"random\" or a lattice");
+    }
     for (const ValueTable& table : values_.list("contact"))
       if (!source_.integrator->hard_cores && table.given("tangential"))
         problems_.error(table.place("tangential"),
@@ -315,6 +324,7 @@ class Interpreter {
         problems_.error(table->place("type"), "a lattice cannot make room for explicit positions",
                         "take type = \"random\", or give all species by count");
       if (placement.type == "compressed") compressed(*table, some && !every);
+      table->read<double>("distance", placement.distance);
       if (const auto* file = table->find<std::string>("file"))
         placement.file = std::filesystem::absolute(deck_.file.parent_path() / *file).lexically_normal();
     }
@@ -479,6 +489,7 @@ class Interpreter {
     table->read<double>("thermo_interval", deck_.plan.thermo_interval);
     table->read<double>("sample_start", deck_.output.sample_start);
     table->read<bool>("events", deck_.plan.events);
+    table->read<bool>("overwrite", deck_.output.overwrite);
     if (const auto* start = table->find<std::string>("start"); start != nullptr && *start == "equilibrated") {
       deck_.plan.from_equilibrium = true;
       if (deck_.plan.thermo_interval == 0)

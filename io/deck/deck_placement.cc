@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <numbers>
 #include <sstream>
 #include <utility>
 
@@ -70,30 +71,57 @@ void place_from_file(const Deck::Source& source, const std::vector<Id>& placed, 
     system.particles.x[placed[n]] = Eigen::Map<const Vec<D>>(positions[n].data());
 }
 
+/// The packing fraction at which random insertion jams.
 template <int D>
-void place_at_random(const Deck::Source& source, const std::vector<Id>& placed, System<D>& system) {
-  const auto& radius = system.particles.radius;
-  const std::size_t done = insert_at_random<D>(system.box, system.particles.x, radius, placed, source.placement.seed);
-  if (done == placed.size()) return;
-  const double wanted = packing_fraction<D>(system.box.volume(), radius);
-  Problems problems;
-  problems.error(source.placement.at,
-                 "random insertion found no place for sphere " + std::to_string(done + 1) + " of " +
-                     std::to_string(placed.size()) + " (packing fraction wanted: " + std::to_string(wanted) + ")",
-                 std::string("take type = \"compressed\" or a lattice, a larger box or fewer spheres; insertion jams "
-                             "at a packing fraction of ") +
-                     (D == 2 ? "0.547" : "0.384"));
-  problems.throw_errors(Failure::initial_state);
+constexpr double kJammed = D == 2 ? 0.547 : 0.384;
+
+[[noreturn]] void refuse(const Place& at, const std::string& what, const std::string& remedy) {
+  throw Error(Failure::initial_state, at.text() + ": error: " + what + "; " + remedy);
 }
 
 template <int D>
-void place_by_compression(const Deck::Source& source, System<D>& system) {
+void place_at_random(const Deck::Source& source, const std::vector<Id>& placed, System<D>& system, const Pause& pause) {
+  const Box<D>& box = system.box;
+  const bool points = !source.integrator->hard_cores;
+  std::vector<double> radius = system.particles.radius;
+  if (points)
+    radius.assign(radius.size(),
+                  0.5 * source.placement.distance.value_or(default_distance<D>(radius.size(), box.volume())));
+  const std::string name = points ? "placement.distance" : "the largest diameter";
+  const double largest = 2 * *std::ranges::max_element(radius);
+  for (int k = 0; k < D; ++k)
+    if (box.boundary[k] != Boundary::open && largest > box.edges[k] + box.gap_tolerance()(largest))
+      refuse(source.placement.at,
+             name + " is " + short_text(largest) + ", and the box is " + short_text(box.edges[k]) + " long on axis " +
+                 std::to_string(k),
+             points ? "give a smaller one, or leave it out" : "enlarge the box or make the spheres smaller");
+  const std::size_t done = insert_at_random<D>(box, system.particles.x, radius, placed, source.placement.seed, pause);
+  if (done == placed.size()) return;
+  const std::string of = std::to_string(done + 1) + " of " + std::to_string(placed.size());
+  const std::string jammed = short_text(kJammed<D>, 3);
+  if (points)
+    refuse(source.placement.at,
+           "random insertion found no place for particle " + of + " at the distance " + short_text(largest) +
+               " from all others",
+           "give a smaller placement.distance, or leave it out");
+  refuse(source.placement.at,
+         "random insertion found no place for sphere " + of +
+             " (packing fraction wanted: " + std::to_string(packing_fraction<D>(box.volume(), radius)) + ")",
+         "take type = \"compressed\" or a lattice, a larger box or fewer spheres; insertion jams at a packing fraction "
+         "of " +
+             jammed);
+}
+
+template <int D>
+void place_by_compression(const Deck::Source& source, System<D>& system, const Pause& pause) {
   using End = typename Compression<D>::End;
   const PlacementConfig& placement = source.placement;
   const auto& radius = system.particles.radius;
-  Compression<D> done = compress<D>(
-      system.box, radius,
-      {.seed = placement.seed, .growth_rate = placement.growth_rate, .max_collisions = placement.max_collisions});
+  Compression<D> done = compress<D>(system.box, radius,
+                                    {.seed = placement.seed,
+                                     .growth_rate = placement.growth_rate,
+                                     .max_collisions = placement.max_collisions,
+                                     .pause = pause});
   if (done.reached()) {
     system.particles.x = std::move(done.x);
     return;
@@ -116,14 +144,12 @@ void place_by_compression(const Deck::Source& source, System<D>& system) {
            << (D == 2 ? "discs of two sizes jam near 0.84, equal discs crystallise"
                       : "equal spheres jam at 0.64 to 0.65 unless they crystallise");
   }
-  Problems problems;
-  problems.error(placement.at, what.str(), remedy.str());
-  problems.throw_errors(Failure::initial_state);
+  refuse(placement.at, what.str(), remedy.str());
 }
 
 /// The sites of each species are drawn; its particles fill them in the order of their coordinates.
 template <int D>
-void place_on_lattice(const Deck::Source& source, Lattice lattice, System<D>& system) {
+void place_on_lattice(const Deck::Source& source, Lattice lattice, System<D>& system, const Pause& pause) {
   std::vector<std::size_t> counts;
   for (const SpeciesConfig& species : source.species) counts.push_back(species.count);
   Particles<D>& p = system.particles;
@@ -138,10 +164,11 @@ void place_on_lattice(const Deck::Source& source, Lattice lattice, System<D>& sy
   const std::vector<int> owner =
       counts.size() > 1 || sites > n ? distribute(sites, counts, source.placement.seed) : std::vector<int>{};
   const Id first = p.size() > 0 ? p.id_of(0) : 0;
+  constexpr std::size_t kSitesBetweenPauses = 1 << 16;
   std::size_t site = 0;
   for_each_site<D>(lattice, system.box, n, margin, [&](const Vec<D>& x) {
     const int species = owner.empty() ? 0 : owner[site];
-    ++site;
+    if (++site % kSitesBetweenPauses == 0 && pause) pause();
     if (species < 0) return;
     const Id id = next[static_cast<std::size_t>(species)]++;
     if (id >= first && id - first < p.size()) p.x[id - first] = x;
@@ -180,7 +207,13 @@ std::vector<std::vector<double>> rows_in(const std::string& text, const std::fil
 }
 
 template <int D>
-void place_particles(const Deck::Source& source, System<D>& system) {
+double default_distance(std::size_t particles, double volume) {
+  constexpr double unit = D == 2 ? std::numbers::pi / 4 : std::numbers::pi / 6;  // of a sphere of diameter 1
+  return elementary::pow(0.5 * kJammed<D> / unit * volume / static_cast<double>(particles), 1.0 / D);
+}
+
+template <int D>
+void place_particles(const Deck::Source& source, System<D>& system, const Pause& pause) {
   const PlacementConfig& placement = source.placement;
   const bool centred = placement.type == "fcc" || placement.type == "hexagonal";
   const Lattice lattice = centred ? Lattice::centred : Lattice::simple;
@@ -189,7 +222,7 @@ void place_particles(const Deck::Source& source, System<D>& system) {
     system.box.edges = commensurate_edges<D>(lattice, source.particles(), filled / *placement.packing_fraction);
   }
   if (built_in_blocks(source)) {
-    place_on_lattice(source, lattice, system);
+    place_on_lattice(source, lattice, system, pause);
     return;
   }
   std::vector<Id> placed;
@@ -205,14 +238,16 @@ void place_particles(const Deck::Source& source, System<D>& system) {
   if (placement.type == "file")
     place_from_file(source, placed, system);
   else if (placement.type == "random")
-    place_at_random(source, placed, system);
+    place_at_random(source, placed, system, pause);
   else if (placement.type == "compressed")
-    place_by_compression(source, system);
+    place_by_compression(source, system, pause);
   else
-    place_on_lattice(source, lattice, system);
+    place_on_lattice(source, lattice, system, pause);
 }
 
-template void place_particles(const Deck::Source&, System<2>&);
-template void place_particles(const Deck::Source&, System<3>&);
+template void place_particles(const Deck::Source&, System<2>&, const Pause&);
+template void place_particles(const Deck::Source&, System<3>&, const Pause&);
+template double default_distance<2>(std::size_t, double);
+template double default_distance<3>(std::size_t, double);
 
 }  // namespace carom

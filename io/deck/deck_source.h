@@ -5,6 +5,7 @@
 
 #include <optional>
 
+#include "engine/setup/placement.h"
 #include "io/deck/deck.h"
 #include "io/deck/deck_values.h"
 
@@ -32,6 +33,7 @@ struct PlacementConfig {
   std::filesystem::path file;
   std::vector<std::vector<double>> positions;  ///< from the file
   double growth_rate = 0, max_collisions = 0;  ///< compressed: engine/setup/compression.h
+  std::optional<double> distance;              ///< random: between two particles without cores
 
   bool lattice() const { return !type.empty() && type != "random" && type != "compressed" && type != "file"; }
 };
@@ -85,7 +87,12 @@ bool built_in_blocks(const Deck::Source& source);
 
 /// Positions as [placement] says, for species given by count. Sets the box if it follows from the packing fraction.
 template <int D>
-void place_particles(const Deck::Source& source, System<D>& system);
+void place_particles(const Deck::Source& source, System<D>& system, const Pause& pause);
+
+/// The smallest distance between two particles without cores in a random placement, if the deck gives none: that at
+/// which spheres of this diameter fill half as much of the box as random insertion can.
+template <int D>
+double default_distance(std::size_t particles, double volume);
 
 /// The rows of a table of numbers: `columns` a line, separated by commas or blanks; # begins a comment, and the first
 /// line may be a heading. Throws Error(Failure::deck), which says that a line is `not_what` it should be.

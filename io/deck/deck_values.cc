@@ -39,7 +39,8 @@ toml::table parse_value(const std::string& text) {
   try {
     return toml::parse("value = " + text);
   } catch (const toml::parse_error&) {
-    if (text.empty() || !std::all_of(text.begin(), text.end(), bare)) throw;
+    const bool too_large = text.find_first_not_of("+-0123456789_") == std::string::npos;  // an integer
+    if (text.empty() || too_large || !std::all_of(text.begin(), text.end(), bare)) throw;
     toml::table table;
     table.insert("value", text);
     return table;
@@ -180,6 +181,11 @@ class NodeReader {
     else
       return wrong_type(node, "a number");
     if (!good(node, number_error(value, key_))) return {};
+    if (const std::string error = beyond_limits(value, key_.type == Parameter::Type::vector_list);
+        key_.unit != "-" && !error.empty()) {
+      complain(node, error.substr(0, error.find("; ")), error.substr(error.find("; ") + 2));
+      return {};
+    }
     return value;
   }
 
@@ -373,6 +379,13 @@ void read_tables(const TableSchema& schema, const DeckToml& deck, bool replace, 
 }
 
 }  // namespace
+
+std::string beyond_limits(double number, bool component) {
+  const double size = std::abs(number);
+  if (size <= kLargestNumber && (size >= kSmallestNumber || component || size == 0)) return {};
+  return "is " + short_text(number) + ", and products with it would be " + (size > 1 ? "infinite" : "0") +
+         "; take units in which it is between " + short_text(kSmallestNumber) + " and " + short_text(kLargestNumber);
+}
 
 Parameters ValueTable::of_variant() const {
   Parameters own;

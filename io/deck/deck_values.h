@@ -15,6 +15,12 @@
 
 namespace carom {
 
+/// Limits of numbers that have a unit, other than 0: products of four of them are neither infinite nor 0.
+constexpr double kLargestNumber = 1e75, kSmallestNumber = 1e-75;
+/// Why a number with a unit is refused, and what to do, in the form "is …; take …"; empty if it is within the limits.
+/// The components of vectors may be small.
+std::string beyond_limits(double number, bool component = true);
+
 /// One table of the deck, read.
 struct ValueTable {
   const TableSchema* schema = nullptr;

@@ -45,6 +45,8 @@ std::vector<Parameter> output_keys() {
   std::vector<Parameter> keys = {
       {"directory", text, "none", "-",
        "where the run writes its files, relative to the working directory; default: runs/ and the name of the deck"},
+      {"overwrite", boolean, "false", "-",
+       "true: the files of an earlier run in the directory are removed; false: they are moved to its backup.N"},
       {"frame_interval", real, "0.0", "time", "simulated time between frames of the trajectory; 0: first and last only",
        Range::non_negative},
       {"thermo_interval", real, "0.0", "time", "simulated time between rows of thermo.csv; 0: first and last only",
@@ -159,7 +161,11 @@ std::vector<TableSchema> make_schema() {
         {"simple-cubic", {}},
         {"hexagonal", {}},
         {"square", {}},
-        {"random", {}},
+        {"random",
+         {{"distance", real, "none", "length",
+           "with verlet, whose particles are points: the smallest distance between two of them; default: that at which "
+           "spheres of this diameter fill 0.19 (discs 0.27) of the box; 0: any",
+           Range::non_negative}}},
         {"compressed",
          {{"growth_rate", real, "0.1", "-",
            "speed at which the largest diameter grows, relative to the thermal speed; it is divided by the reduced "

@@ -26,17 +26,17 @@ std::string plural(std::size_t n, const std::string& one, const std::string& man
   return std::to_string(n) + " " + (n == 1 ? one : many);
 }
 
-/// The place in the deck that gives the position of this particle.
-const Place& place_of(const Deck::Source& source, Id id) {
-  const SpeciesConfig* config = source.species.data();
-  for (std::size_t end = config->count; end <= id; end += config->count) ++config;
-  return config->placed ? source.placement.at : config->at;
-}
-
 template <int D>
 void check_box(const Deck::Source& source, const System<D>& system, Problems& problems) {
   const auto radius = system.decomposition.radii();
-  const double diameter = 2 * *std::max_element(radius.begin(), radius.end());
+  const auto [smallest, largest] = std::ranges::minmax(radius);
+  const double diameter = 2 * largest, rounded = system.box.gap_tolerance()(0);
+  constexpr double kDeepest = 1e-6;  // [contact distance], an overlap that ends the run
+  if (rounded > kDeepest * smallest)
+    problems.error(source.box,
+                   say("distances in a box of ", short_text(system.box.edges.maxCoeff()), " are known to ",
+                       short_text(rounded, 2), " only, and the smallest radius is ", short_text(smallest)),
+                   "shorten the longest edge; the rounding of positions would make spheres overlap");
   for (int k = 0; k < D; ++k) {
     const double edge = system.box.edges[k];
     if (!system.box.periodic(k) || edge >= diameter - system.box.gap_tolerance()(diameter)) continue;
@@ -66,11 +66,84 @@ void check_spheres(const Deck::Source& source, const System<D>& system, Problems
                    "move them apart, make the radii smaller or the box larger");
 }
 
+/// A rescaling bath multiplies velocities, so that particles at rest stay there unless something else moves them.
+template <int D>
+void check_bath(const Deck::Source& source, const System<D>& system, Problems& problems) {
+  const Bath& bath = system.box.bath;
+  if (!bath.rescales() || !system.interactions.empty() || std::max(bath.temperature, bath.last_temperature) == 0 ||
+      std::ranges::any_of(system.box.options, [](const auto& wall) { return wall.moves(); }))
+    return;
+  auto moving = static_cast<std::uint64_t>(
+      std::ranges::count_if(system.particles.v, [](const Vec<D>& v) { return v != Vec<D>::Zero(); }));
+  system.decomposition.ranks().sum({&moving, 1});
+  if (moving == 0)
+    problems.error(source.baths[0].at, "a rescaling bath multiplies velocities, and all particles are at rest",
+                   "give the particles a temperature above 0, or take type = \"andersen\"");
+}
+
+/// The longest bond of an interaction [length]; infinite: too long for a periodic box. Collective.
+template <int D>
+double longest_bond(const Interaction<D>& term, const System<D>& system) try {
+  const auto& p = system.particles;
+  if (!system.decomposition.joined()) return term.reach(p.x);
+  Communicator& ranks = system.decomposition.ranks();
+  double longest = term.reach(p, ranks);
+  ranks.largest({&longest, 1});
+  return longest;
+} catch (const Error&) {
+  return std::numeric_limits<double>::infinity();
+}
+
+/// In equilibrium the energy E of a spring exceeds x kT with the probability erfc(√x). For x = 32 this is 1.2e-15, so
+/// that one in a million states of 10⁹ bonds has such a bond.
+constexpr double kMostOfBond = 32;  // [kT]
+
+/// Bonds so stretched that they would heat the particles.
+template <int D>
+void check_bonds(const Deck::Source& source, const System<D>& system, Problems& problems) {
+  const bool cooled = system.box.bath.type != Bath::Type::none;
+  double temperature = cooled ? system.box.bath.temperature : 0;
+  for (const SpeciesConfig& species : source.species)
+    temperature = std::max(temperature, species.temperature.value_or(0));
+  const PlacementConfig& placement = source.placement;
+  const bool placed = !placement.type.empty() && placement.type != "file" &&
+                      std::ranges::any_of(source.species, &SpeciesConfig::placed);
+  for (std::size_t n = 0; n < system.interactions.size() && temperature > 0; ++n) {
+    const InteractionConfig& config = source.interactions[n];
+    if (config.info->kind != InteractionInfo::Kind::bonded) continue;
+    const double longest = longest_bond(*system.interactions[n], system),
+                 beyond = longest - config.parameters.real("rest_length");
+    const double energy = 0.5 * config.parameters.real("stiffness") * beyond * beyond;
+    if (!(beyond > 0 && energy > kMostOfBond * temperature)) continue;
+    const std::string length = std::isinf(longest) ? "half an edge of the periodic box or more" : say(longest);
+    const std::string what =
+        say("the longest bond is ", length, " long, its rest length is ", config.parameters.real("rest_length"), ": ",
+            std::isinf(longest) ? "" : say("its energy is ", short_text(energy / temperature, 3), " kT, and "),
+            "a bond in equilibrium has not more than ", kMostOfBond, " kT");
+    if (placed && (!cooled || std::isinf(longest)))
+      problems.error(placement.at, "type = \"" + placement.type + "\" does not look at bonds: " + what,
+                     placement.lattice()
+                         ? "take a count that fills the lattice and a chain_length that divides its rows, at a "
+                           "distance near rest_length, or type = \"file\""
+                         : "give positions by type = \"file\", or take a lattice whose rows are the chains");
+    else if (!std::isinf(longest))
+      problems.warning(config.at, what, "the bonds will heat the particles; start with bonds near their rest length");
+  }
+}
+
 }  // namespace
 
+const Place& place_of(const Deck::Source& source, Id id) {
+  const SpeciesConfig* config = source.species.data();
+  for (std::size_t end = config->count; end <= id; end += config->count) ++config;
+  return config->placed ? source.placement.at : config->at;
+}
+
 template <int D>
-void check_state(const Deck& deck, const System<D>& system, Problems& problems) {
+void check_state(const Deck& deck, const System<D>& system, Problems& problems, bool fresh) {
   const Deck::Source& source = *deck.source;
+  check_bath(source, system, problems);
+  if (fresh) check_bonds(source, system, problems);
   if (!source.integrator->hard_cores) return;
   check_box(source, system, problems);
   if (problems.errors() == 0) check_spheres(source, system, problems);
@@ -124,11 +197,11 @@ void warn_of_state(const Deck& deck, System<D>& system, Problems& problems) {
                      "a tenth of that period or less is usual");
 }
 
-template void check_state(const Deck&, const System<2>&, Problems&);
+template void check_state(const Deck&, const System<2>&, Problems&, bool);
 template double shortest_period(const System<2>&);
 template void warn_of_state(const Deck&, System<2>&, Problems&);
 
-template void check_state(const Deck&, const System<3>&, Problems&);
+template void check_state(const Deck&, const System<3>&, Problems&, bool);
 template double shortest_period(const System<3>&);
 template void warn_of_state(const Deck&, System<3>&, Problems&);
 

@@ -6,10 +6,13 @@
 
 namespace carom {
 
+/// The place in the deck that gives the position of this particle.
+const Place& place_of(const Deck::Source& source, Id id);
+
 /// Overlapping spheres, spheres outside the walls, a box too small or too full. Points (integrators without hard cores)
-/// may be anywhere.
+/// may be anywhere. A bath that cannot heat; if the deck has given the positions (`fresh`), bonds that are too long.
 template <int D>
-void check_state(const Deck& deck, const System<D>& system, Problems& problems);
+void check_state(const Deck& deck, const System<D>& system, Problems& problems, bool fresh);
 
 /// A step too long for the forces, cutoffs beyond half the box, more than close packing, walls that do nothing.
 template <int D>

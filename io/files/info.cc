@@ -8,7 +8,9 @@
 #include "engine/base/error.h"
 #include "io/deck/deck_problems.h"
 #include "io/files/checkpoint.h"
+#include "io/files/directory_lock.h"
 #include "io/files/hdf5.h"
+#include "io/files/journal.h"
 #include "io/files/output_directory.h"
 #include "io/files/trajectory_reader.h"
 
@@ -94,10 +96,18 @@ std::string describe_file(const std::filesystem::path& path) {
   }
   const std::string head = line("file", path.string());
   if (is_checkpoint(path)) return head + describe_checkpoint(path);
-  const hdf5::File file = hdf5::File::open(path);
-  if (hdf5::exists(file, "/events/time_in_slab")) return head + describe_events(file);
-  need_trajectory(file);
-  return head + describe_trajectory(file);
+  std::string text;
+  hdf5::read_between_flushes(path, [&] {
+    const hdf5::File file = hdf5::File::open_unlocked(path);
+    const bool events = hdf5::exists(file, "/events/time_in_slab");
+    if (!events) need_trajectory(file);
+    text = events ? describe_events(file) : describe_trajectory(file);
+  });
+  if (run_is_at_work(path.parent_path()))
+    text += line("being written",
+                 "Python's carom.open() reads it meanwhile; other programs report \"unable to lock file\", and "
+                 "read it with HDF5_USE_FILE_LOCKING=FALSE, best opened anew for later frames");
+  return head + text;
 }
 
 int info_command(const std::filesystem::path& file) {

@@ -102,6 +102,22 @@ std::string memory_text(std::span<const RankAccount> ranks) {
                      sum / static_cast<double>(ranks.size()));
 }
 
+/// The means that have no standard error, and the length of a run that may have one; empty if all have.
+std::string missing_errors_text(const Statistics& s) {
+  std::string names;
+  double longest = 0;
+  for (std::size_t k = 0; k < Statistics::mean_names.size(); ++k) {
+    const double needed = s.needed_time(s.estimate(k));
+    if (!std::isfinite(needed)) continue;
+    names.append(names.empty() ? "" : ", ").append(Statistics::mean_names[k]);
+    longest = std::max(longest, needed);
+  }
+  if (names.empty()) return "";
+  return fmt::format(
+      "\nno standard error of: {}; at the correlations seen so far a run to time {:.3g} at least may have all", names,
+      longest);
+}
+
 }  // namespace
 
 std::string banner_text(const Deck& deck, std::size_t particles, int ranks) {
@@ -179,6 +195,7 @@ std::string report_text(const Deck& deck, const Statistics& s, std::span<const R
       s.collision_rate, c.max_overlap);
   if (s.mean_free_time)
     text += fmt::format("\nmean free time {:.6g}, mean free path {:.6g}", *s.mean_free_time, *s.mean_free_path);
+  text += missing_errors_text(s);
   if (s.force_passes > 0)
     text += fmt::format("\n{:.6g} force passes, {} sweeps, {} steps halved, {} fallbacks", s.force_passes, c.sweeps,
                         c.slabs_halved, c.fallbacks);

@@ -26,7 +26,7 @@ void make_output_directory(const fs::path& directory) try {
   fail(directory, e);
 }
 
-std::optional<fs::path> prepare_output_directory(const fs::path& directory) try {
+std::optional<fs::path> prepare_output_directory(const fs::path& directory, bool overwrite) try {
   std::optional<fs::path> backup;
   std::vector<std::string> names = {
       run_file::deck,    run_file::trajectory, run_file::thermo,     run_file::events,
@@ -37,7 +37,12 @@ std::optional<fs::path> prepare_output_directory(const fs::path& directory) try 
   for (std::size_t n = 0; n < files; ++n)
     for (const char* left : {".journal", ".part"}) names.push_back(names[n] + left);
   for (const std::string& name : names) {
-    if (!fs::exists(fs::symlink_status(directory / name))) continue;
+    const fs::file_status is = fs::symlink_status(directory / name);
+    if (!fs::exists(is)) continue;
+    if (overwrite && (fs::is_regular_file(is) || fs::is_symlink(is))) {
+      fs::remove(directory / name);
+      continue;
+    }
     for (int n = 1; !backup; ++n) {
       // create_directory returns whether the name was free, also if two runs start at once.
       const fs::path candidate = directory / ("backup." + std::to_string(n));

@@ -29,7 +29,9 @@ inline std::string averages(const ObservableInfo& info) { return std::string(inf
 void make_output_directory(const std::filesystem::path& directory);
 
 /// Requires that the directory exists. If it has files of these names, moves them into its subdirectory `backup.1`, or
-/// the next number that is free, and returns that. Throws Error(Failure::file).
-std::optional<std::filesystem::path> prepare_output_directory(const std::filesystem::path& directory);
+/// the next number that is free, and returns that. With `overwrite` removes them instead, except for what is neither a
+/// file nor a link. Throws Error(Failure::file).
+std::optional<std::filesystem::path> prepare_output_directory(const std::filesystem::path& directory,
+                                                              bool overwrite = false);
 
 }  // namespace carom

@@ -21,7 +21,7 @@ RunRecord<D>::RunRecord(Deck deck, Simulation<D>& simulation, const CheckpointHe
     outcome_.branched_from = continued->branched_from;
     bonds_ = continued->bonds;
   } else {
-    backup = prepare_output_directory(directory);
+    backup = prepare_output_directory(directory, deck_.output.overwrite);
     bonds_ = found_bonds(deck_, simulation.system());
   }
   log_ = std::make_unique<RunLog>(directory / run_file::log, true,

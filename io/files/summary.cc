@@ -2,6 +2,7 @@
 #include "io/files/summary.h"
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "io/files/rank_account.h"
@@ -16,13 +17,10 @@ using Json = nlohmann::ordered_json;
 Json number_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
 /// NaN is null.
-Json json_of(const Estimate& estimate) {
-  return {{"mean", estimate.mean}, {"standard_error", estimate.error}, {"independent_samples", estimate.samples}};
-}
-
-/// Of a column; nothing but NaN if there is no such column.
-Estimate estimate_of(const Blocking& series, std::size_t column) {
-  return column < series.columns() ? series.estimate(column) : Estimate();
+Json json_of(const Estimate& estimate, const Statistics& of) {
+  Json json = {{"mean", estimate.mean}, {"standard_error", estimate.error}, {"independent_samples", estimate.samples}};
+  if (const double needed = of.needed_time(estimate); std::isfinite(needed)) json["needed_time"] = needed;
+  return json;
 }
 
 }  // namespace
@@ -72,7 +70,7 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
       {"peak_memory_bytes", std::max(outcome.peak_memory_bytes, peak_memory_bytes())},
   };
   for (std::size_t k = 0; k < Statistics::mean_names.size(); ++k)
-    json["means"][Statistics::mean_names[k]] = json_of(estimate_of(s.series, k));
+    json["means"][Statistics::mean_names[k]] = json_of(s.estimate(k), s);
   if (deck.plan.from_equilibrium && s.equilibrium)
     json["equilibration"] = {{"transient_end", s.equilibrium->transient_end}, {"start", s.equilibrium->start}};
   else if (deck.plan.from_equilibrium)
@@ -89,7 +87,7 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
     add("force", force);
     if (wall.area > 0) add("pressure", force / wall.area);
     if (front) {  // with the rear
-      const Estimate of_force = estimate_of(s.series, Statistics::mean_names.size() + wall.number);
+      const Estimate of_force = s.estimate(Statistics::mean_names.size() + wall.number);
       entry["force_standard_error"] = of_force.error;
       if (wall.area > 0) entry["pressure_standard_error"] = of_force.error / wall.area;
       entry["independent_samples"] = of_force.samples;
@@ -97,6 +95,11 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
     add("work", tally.work.value());
     add("heat", tally.heat.value());
   }
+  if (json.contains("walls"))
+    for (Json& entry : json["walls"])
+      if (entry["collisions"] == 0)  // no hit says nothing about how rare hits are
+        for (const char* key : {"force_standard_error", "pressure_standard_error", "independent_samples"})
+          if (entry.contains(key)) entry[key] = nullptr;
   if (!outcome.branched_from.empty())
     json["branched_from"] = {{"checkpoint", outcome.branched_from}, {"step", s.start_steps}, {"time", s.start_time}};
   for (const SpeciesValue& value : outcome.species_values)

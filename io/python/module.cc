@@ -99,7 +99,11 @@ void run(Session<D>& session, const Plan& plan, const py::object& callback, cons
     return raised.has_value();
   };
   if (!callback.is_none()) hooks.show = [&] { in_python([&] { return call(callback); }); };
-  session.run(plan, hooks);
+  try {
+    session.run(plan, hooks);
+  } catch (const Error& error) {
+    if (error.failure() != Failure::interrupted) throw;  // else `raised` or `cut` says more
+  }
   unlocked.reset();
   if (raised) throw std::move(*raised);
   if (cut) {
@@ -187,13 +191,14 @@ void bind(py::module_& module, const char* name) {
       .def("means",
            [](const S& session) {
              py::dict all;
-             const Blocking& series = session.statistics().series;
+             const Statistics& statistics = session.statistics();
              for (std::size_t k = 0; k < Statistics::mean_names.size(); ++k) {
-               const Estimate e = k < series.columns() ? series.estimate(k) : Estimate();
+               const Estimate e = statistics.estimate(k);
                py::dict entry;
                entry["mean"] = e.mean;
                entry["standard_error"] = e.error;
                entry["independent_samples"] = e.samples;
+               entry["needed_time"] = statistics.needed_time(e);
                all[Statistics::mean_names[k]] = entry;
              }
              return all;
@@ -305,7 +310,9 @@ py::tuple from_deck(const std::string& file, const std::vector<std::string>& set
                     const std::optional<std::string>& text) {
   Deck deck = read_deck(
       file, set, [&](const std::filesystem::path& path) { return text && path == file ? text : read_text(path); });
-  return opened(deck);
+  return opened(deck, std::nullopt, [] {
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  });
 }
 
 /// The simulation of a run to be continued.

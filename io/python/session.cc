@@ -32,10 +32,15 @@ Vec<D> vector_at(std::span<const double> values, std::size_t i) {
 
 template <class T>
 void need_finite(std::span<const T> rows, const char* what) {
-  for (std::size_t i = 0; i < rows.size(); ++i)
+  for (std::size_t i = 0; i < rows.size(); ++i) {
     if (!rows[i].allFinite())
       throw Error(Failure::initial_state, std::string(what) + ": those of particle " + std::to_string(i) +
                                               " are not finite; give finite numbers");
+    for (const double each : rows[i])
+      if (const std::string error = beyond_limits(each); !error.empty())
+        throw Error(Failure::initial_state,
+                    std::string(what) + ": a number of particle " + std::to_string(i) + " " + error);
+  }
 }
 
 }  // namespace
@@ -63,8 +68,8 @@ Session<D>::Session(std::span<const double> edges, const std::vector<std::string
 }
 
 template <int D>
-Session<D>::Session(Deck& deck, const std::optional<GivenState>& given) {
-  system_ = build_system<D>(deck, nullptr, given ? &*given : nullptr);
+Session<D>::Session(Deck& deck, const std::optional<GivenState>& given, const Pause& pause) {
+  system_ = build_system<D>(deck, nullptr, given ? &*given : nullptr, pause);
   plan_ = deck.plan;
   box_ = system_->box;
   for (const auto& wall : deck.source->walls) walls_.push_back(wall.parameters);
@@ -135,8 +140,15 @@ void Session<D>::add_particles(const Columns& columns) {
         all.spin[id] = Eigen::Map<const Spin<D>>(columns.spin.data() + i * Spin<D>::SizeAtCompileTime);
     }
     system_->check();
+    for (const auto& [what, numbers] : {std::pair{"position", columns.x},
+                                        {"velocity", columns.v},
+                                        {"radius", columns.radius},
+                                        {"charge", columns.charge}})
+      for (const double each : numbers)
+        if (const std::string error = beyond_limits(each); !error.empty())
+          throw Error(Failure::initial_state, std::string("add_particles: a number in '") + what + "' " + error);
     if (columns.inertia != 0) set_inertia(columns.species, columns.inertia);
-    system_->wrap();
+    system_->wrap(Failure::initial_state);
     terms_.make(*system_);
   } catch (...) {
     resize(before);
@@ -151,7 +163,7 @@ template <int D>
 void Session<D>::set_position(std::span<const double> x) {
   set(&Particles<D>::x, x, "positions");
   std::ranges::fill(system_->particles.image, Image<D>{});
-  system_->wrap();
+  system_->wrap(Failure::initial_state);
 }
 
 template <int D>

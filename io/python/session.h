@@ -48,7 +48,7 @@ class Session {
   /// All members throw Error.
   Session(std::span<const double> edges, const std::vector<std::string>& boundary);
   /// The initial state of a deck, or a given state.
-  explicit Session(Deck& deck, const std::optional<GivenState>& given = {});
+  explicit Session(Deck& deck, const std::optional<GivenState>& given = {}, const Pause& pause = {});
   /// The last checkpoint of a run that wrote files to a directory; the next run() continues the run and its files.
   Session(Deck& deck, Resumed& from);
 

@@ -105,7 +105,10 @@ void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
       return path == file ? std::optional(text) : read_text(path);
     });
     set_ends(deck, plan);
-    build_system<D>(deck);
+    build_system<D>(deck, nullptr, nullptr, [&] {
+      if (hooks.stop && hooks.stop(statistics_))
+        throw Error(Failure::interrupted, "stopped while the particles were placed; no file was written");
+    });
     deck_ = std::move(deck);
   } else {
     set_tables(*deck_, "contact", contacts_);  // laws and the bath may have changed since the last run
@@ -114,9 +117,12 @@ void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
   }
   const Plan& of = deck_->plan;
   if (hooks.show && plan.thermo_interval > 0 && plan.thermo_interval != of.thermo_interval)
-    refuse("run: 'every' is " + short_text(plan.thermo_interval) + ", but the rows of thermo.csv come every " +
-           short_text(of.thermo_interval) +
-           "; the callback is called with each row: leave 'every' out, or give output() that thermo_interval");
+    refuse("run: 'every' is " + short_text(plan.thermo_interval) +
+           (of.thermo_interval > 0
+                ? ", but the rows of thermo.csv come every " + short_text(of.thermo_interval) +
+                      "; the callback is called with each row: leave 'every' out, or give output() that thermo_interval"
+                : ", but output() got no thermo_interval, so that thermo.csv has its first and its last row only; the "
+                  "callback is called with each row: give output() that thermo_interval"));
   plan.frame_interval = of.frame_interval;
   plan.thermo_interval = of.thermo_interval;
   plan.events = of.events;

@@ -26,6 +26,20 @@ DECK_ERRORS = {
     "unknown table": (
         changed("[run]", "[outptu]\nevents = true\n[run]"),
         26, ["unknown key 'outptu'", "did you mean 'output'?"]),
+    # Numbers whose products cannot be computed: one error, at the line of the number.
+    "huge velocity": (changed("velocity = [[1.0, 0.0]", "velocity = [[1e160, 0.0]"), 12, ["'velocity' is 1e+160", "would be infinite"]),
+    "huge box": (changed("box = [10.0, 10.0]", "box = [1e308, 10.0]"), 6, ["'box' is 1e+308", "would be infinite", "take units"]),
+    "huge radius": (changed("radius = 0.5", "radius = 1e300"), 13, ["'radius' is 1e+300", "would be infinite"]),
+    "tiny radius": (changed("radius = 0.5", "radius = 1e-160"), 13, ["'radius' is 1e-160", "would be 0"]),
+    "huge mass": (changed("mass = 1.0", "mass = 1e300"), 14, ["'mass' is 1e+300", "would be infinite"]),
+    "huge charge": (changed("mass = 1.0", "mass = 1.0\ncharge = 1e300"), 15, ["'charge' is 1e+300", "would be infinite"]),
+    "huge stiffness": (changed("stiffness = 1.0", "stiffness = 1e300"), 19, ["'stiffness' is 1e+300", "would be infinite"]),
+    "huge step": (changed("step = 0.01", "step = 1e300"), 24, ["'step' is 1e+300", "would be infinite"]),
+    "integer beyond 64 bits": (changed("steps = 10", "steps = 99999999999999999999"), 27, ["not valid TOML", "99999999999999999999"]),
+    "distance of spheres": (
+        changed('type = "fcc"', 'type = "random"\ndistance = 0.5', FLUID), 16, ["'distance' is for points", "leave it out"]),
+    "points compressed": (
+        lennard_jones("cutoff = 2.0").replace('"fcc"', '"compressed"'), 15, ["treats particles as points, which cannot be compressed"]),
     "wrong type": (
         changed("steps = 10", 'steps = "ten"'),
         27, ["'steps' has the wrong type: string", "give a positive integer"]),
@@ -251,6 +265,16 @@ def test_deck_error(tmp_path, name):
 
 
 # name: (deck, required parts of the message)
+# Chains of four along the rows of a cubic lattice of spacing 1.5.
+CHAINS = FLUID.replace('"fcc"', '"simple-cubic"').replace('type = "free-flight"', 'type = "edda"\nstep = 0.01').replace("[integrator]", """\
+[[interaction]]
+type = "harmonic-bond"
+chain = true
+chain_length = 4
+stiffness = 100.0
+rest_length = 1.5
+[integrator]""")
+
 IMPOSSIBLE_STATES = {
     "overlap": (
         changed("[5.0, 5.0]]", "[2.8, 5.0]]"),
@@ -273,6 +297,30 @@ IMPOSSIBLE_STATES = {
     "more spheres than box": (
         changed("box = [6.0, 6.0, 6.0]", "box = [2.0, 2.0, 2.0]", FLUID),
         ["of the box", "enlarge the box"]),
+    "a box too large for the digits of positions": (
+        changed("box = [10.0, 10.0]", "box = [10.0, 1e20]"),
+        ["deck.toml:6:7: ", "distances in a box of 1e+20 are known to 6.6e+04 only, and the smallest radius is 0.5", "shorten the longest edge"]),
+    "spheres wider than the box": (
+        changed("box = [6.0, 6.0, 6.0]", "box = [8e-9, 8e-9, 8e-9]", FLUID.replace('"fcc"', '"random"')),
+        ["the largest diameter is 1, and the box is 8e-09 long on axis 0", "enlarge the box"]),
+    "no room for points": (
+        lennard_jones("cutoff = 2.0").replace('"fcc"', '"random"\ndistance = 3.0').replace("collisions", "steps"),
+        ["random insertion found no place for particle", "at the distance 3 from all others", "give a smaller placement.distance"]),
+    "a distance beyond the box": (
+        lennard_jones("cutoff = 2.0").replace('"fcc"', '"random"\ndistance = 7.0').replace("collisions", "steps"),
+        ["placement.distance is 7, and the box is 6 long on axis 0", "give a smaller one"]),
+    "a position 3e9 boxes away": (
+        changed('["wall", "wall"]', '["periodic", "wall"]').replace("[5.0, 5.0]]", "[3e10, 5.0]]"),
+        ["deck.toml:9:1: ", "particle 1 is more than 2147483647 periodic boxes away", "give a position in the box"]),
+    "a rescaling bath of particles at rest": (
+        FLUID.replace("temperature = 1.0", "temperature = 0.0") + '[[bath]]\ntype = "rescaling"\ntemperature = 1.0\nrate = 1.0\n',
+        ["deck.toml:22:1: ", "a rescaling bath multiplies velocities, and all particles are at rest", "andersen"]),
+    "chains through vacancies": (
+        CHAINS.replace("count = 64", "count = 63"),
+        ["deck.toml:14:1: ", "type = \"simple-cubic\" does not look at bonds: the longest bond is", "its rest length is 1.5", "32 kT"]),
+    "chains at random": (
+        CHAINS.replace('"simple-cubic"', '"random"'),
+        ["deck.toml:14:1: ", "type = \"random\" does not look at bonds", "half an edge of the periodic box or more", "type = \"file\""]),
     "random insertion jams": (
         changed('"fcc"', '"random"', FLUID).replace("count = 64", "count = 200"),
         ["random insertion found no place for sphere", "of 200", "0.384"]),
@@ -286,6 +334,51 @@ def test_impossible_state(tmp_path, name):
     assert all(w in answer.stderr for w in wanted), answer.stderr
     assert answer.stderr.startswith("deck.toml:")
     assert answer.returncode == 3
+
+
+def test_stretched_bonds_are_warned_of_where_the_deck_gives_the_positions(tmp_path):
+    """Bonds near their rest length are not, nor those of cold particles, whose energy is compared with nothing."""
+    springs = changed("velocity = [[1.0, 0.0], [0.0, 0.0]]", "temperature = 1.0")
+    assert validate(tmp_path, springs).stderr == ""
+    stiff = validate(tmp_path, springs.replace("stiffness = 1.0", "stiffness = 100.0"))  # k (3 - 2)^2 / 2 = 50
+    assert stiff.returncode == 0 and stiff.stderr.startswith("deck.toml:16:1: warning: the longest bond is 3 long")
+    assert "its energy is 50 kT" in stiff.stderr
+    assert validate(tmp_path, changed("stiffness = 1.0", "stiffness = 100.0")).stderr == ""
+    assert validate(tmp_path, CHAINS).stderr == ""
+    bath = '[[bath]]\ntype = "andersen"\ntemperature = 1.0\nrate = 1.0\n'
+    heated = validate(tmp_path, CHAINS.replace("rest_length = 1.5", "rest_length = 0.5") + bath)
+    assert heated.returncode == 0 and "its energy is 50 kT" in heated.stderr
+
+
+def test_particles_that_come_to_rest_cannot_be_heated(tmp_path):
+    still = changed("[1.0, 0.0], [0.0, 0.0]]", "[1.0, 0.0], [-1.0, 0.0]]").replace('["wall", "wall"]', '["periodic", "periodic"]')
+    still = still[:still.index("[[interaction]]")] + """\
+[[contact]]
+between = ["*", "*"]
+restitution = 0.0
+[[bath]]
+type = "rescaling"
+temperature = 1.0
+rate = 1e-9
+[integrator]
+type = "psa"
+step = 0.01
+[run]
+end_time = 5.0
+"""
+    (tmp_path / "deck.toml").write_text(still)
+    done = carom("run", "deck.toml", "-o", "out", "--quiet", cwd=tmp_path)
+    assert done.returncode == 4 and "have come to rest, and a rescaling bath cannot heat" in done.stderr, done.stderr
+
+
+def test_images_are_counted_with_32_bits(tmp_path):
+    """2147483640 boxes away at the start; it crosses seven more, but not ten."""
+    far = changed('["wall", "wall"]', '["periodic", "wall"]').replace("[2.0, 5.0]", "[21474836402.0, 5.0]").replace("[1.0, 0.0]", "[500.0, 0.0]")
+    far = far[:far.index("[[interaction]]")] + '[integrator]\ntype = "psa"\nstep = 0.01\n[run]\nsteps = 10\n'
+    (tmp_path / "deck.toml").write_text(far.replace("[5.0, 5.0]", "[5.0, 8.0]"))
+    assert carom("run", "deck.toml", "-o", "near", "--quiet", cwd=tmp_path).returncode == 0
+    done = carom("run", "deck.toml", "-o", "far", "--quiet", "--set", "run.steps=20", cwd=tmp_path)
+    assert done.returncode == 4 and "has crossed the periodic box 2.14748e+09 times along axis 0" in done.stderr, done.stderr
 
 
 def test_g_of_r_without_a_density_or_room(tmp_path):
@@ -356,6 +449,7 @@ SET_ERRORS = {
     "no such table": ("particles.3.radius=1", "--set particles.3.radius: error: there is no such table; "),
     "no index in a list of several": ("interaction.stiffness=2", "--set interaction.stiffness: error: there is no such table; count the tables"),
     "no value": ("integrator.step", "--set integrator.step: error: no value; "),
+    "integer beyond 64 bits": ("run.steps=99999999999999999999", "--set run.steps: error: cannot read the value"),
     "malformed value": ("system.box=[1, 2", "--set system.box: error: cannot read the value"),
 }
 

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Initial states through the command: compression to high density, its errors, mixtures on lattices and at random."""
 
+import pathlib
+import signal
 import subprocess
+import time
 import tomllib
 
 import numpy as np
@@ -101,3 +104,81 @@ def test_mixtures_on_lattices_and_at_random(dimension, lattice, tmp_path):
         assert (x[:, 1] >= radius).all() and (x[:, 1] <= box[1] - radius).all()
         large = x[radius == 1.0]
         assert np.ptp(large, axis=0)[:dimension].min() > 0.4 * box[:dimension].min()  # mixed, not in one corner
+
+
+# Argon in SI units; a picture of it has the radius 0.5.
+ARGON = """
+format = 1
+[system]
+dimension = 3
+box = [8e-9, 8e-9, 8e-9]
+boundary = ["periodic", "periodic", "periodic"]
+[[particles]]
+name = "argon"
+count = 40
+mass = 6.6e-26
+temperature = 1.2e-21
+[placement]
+type = "random"
+[[interaction]]
+type = "lennard-jones"
+epsilon = 1.65e-21
+sigma = 3.4e-10
+cutoff = 1e-9
+[integrator]
+type = "verlet"
+step = 1e-15
+[run]
+steps = 100
+"""
+
+
+@pytest.mark.parametrize("overrides, distance", [
+    ([], (0.5 * 0.384 * 6 / np.pi / 40) ** (1 / 3) * 8e-9),  # 40 spheres of this diameter fill half of 0.384
+    (["particles.0.count=300", "particles.0.display_radius=1.0", "system.box=[5, 5, 5]", "interaction.sigma=0.4", "interaction.cutoff=1",
+      "interaction.epsilon=1", "particles.0.temperature=1", "particles.0.mass=1", "integrator.step=0.001"],
+     (0.5 * 0.384 * 6 / np.pi / 300) ** (1 / 3) * 5),
+    (["placement.distance=1e-9"], 1e-9)])
+def test_points_keep_a_distance_that_fits_into_the_box(overrides, distance, tmp_path):
+    """Whatever radius pictures show."""
+    run(write_deck(tmp_path, ARGON), tmp_path / "out", overrides)
+    x, _, box = start(tmp_path / "out")
+    closest = smallest_gap(x, np.zeros(len(x)), box, True)
+    assert distance <= closest < 1.5 * distance
+    resolved = tomllib.loads((tmp_path / "out" / "deck.toml").read_text())["placement"]["distance"]
+    assert abs(resolved / distance - 1) < 1e-12
+    s = summary(tmp_path / "out")
+    assert s["status"] == "done" and s["warnings"] == []
+
+
+# Far more work than a test has time for.
+CROWD = SPHERES.replace("count = 108", "count = 300000").replace('type = "fcc"\npacking_fraction = 0.3', 'type = "random"\npacking_fraction = 0.375')
+STOPPED = ": stopped by {} while the particles were placed; no file was written: start it again\n"
+
+
+@pytest.mark.parametrize("deck, overrides", [(CROWD, []), (CROWD, ["placement.type=simple-cubic"]), (MIXTURE, [])],
+                         ids=["random", "lattice", "compressed"])
+def test_a_wall_time_ends_a_placement(deck, overrides, tmp_path):
+    done = run(write_deck(tmp_path, deck), tmp_path / "out", overrides, ("--max-wall", "0"), code=75)
+    assert done.stderr.endswith(STOPPED.format("--max-wall")) and not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("overrides", [[], ["placement.type=compressed", "placement.packing_fraction=0.6"]], ids=["random", "compressed"])
+def test_a_signal_ends_a_placement(overrides, tmp_path):
+    sets = [part for override in overrides for part in ("--set", override)]
+    with subprocess.Popen([CAROM, "run", write_deck(tmp_path, CROWD), "-o", tmp_path / "out", "--quiet", *sets],
+                          stderr=subprocess.PIPE, text=True) as process:
+        try:
+            while not handles(process, signal.SIGTERM):
+                time.sleep(0.01)
+            process.terminate()
+            said = process.communicate(timeout=100)[1]
+        finally:
+            process.kill()
+    assert process.returncode == 75 and said.endswith(STOPPED.format("SIGTERM")) and not (tmp_path / "out").exists()
+
+
+def handles(process, number):
+    status = pathlib.Path(f"/proc/{process.pid}/status").read_text()
+    mask = int(next(line for line in status.splitlines() if line.startswith("SigCgt")).split()[1], 16)
+    return mask >> (number - 1) & 1

@@ -111,6 +111,10 @@ def test_what_output_refuses(tmp_path):
     sim.output(tmp_path / "run", thermo_interval=0.1)
     with pytest.raises(carom.UsageError, match="'every' is 0.3, but the rows of thermo.csv come every 0.1"):
         sim.run(time=1, every=0.3, callback=print)
+    sim.output(tmp_path / "run", frame_interval=0.1)
+    with pytest.raises(carom.UsageError, match=r"output\(\) got no thermo_interval, .* give output\(\) that thermo_interval"):
+        sim.run(time=1, every=0.3, callback=print)
+    sim.output(tmp_path / "run", thermo_interval=0.1)
     sim.run(time=1)
     (tmp_path / "run" / "thermo.csv").write_text("another\n")
     with pytest.raises(carom.FileError, match="thermo.csv"):
@@ -124,11 +128,74 @@ def test_an_earlier_run_is_kept_and_said(tmp_path):
         sim.output(tmp_path / "run", thermo_interval=0.5)
         last = sim
         if (tmp_path / "run").exists():
-            with pytest.warns(UserWarning, match="are now in .*backup.1"):
+            with pytest.warns(carom.CaromWarning, match="^the files of an earlier run in this directory are now in .*backup.1"):
                 sim.run(time=1)
         else:
             sim.run(time=1)
     assert (tmp_path / "run/backup.1/thermo.csv").exists() and last.time == 1
+
+
+def test_an_earlier_run_is_replaced_on_request(tmp_path, recwarn):
+    """Files of other names stay."""
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run/notes.csv").write_text("mine")
+    for more in ({"rdf_interval": 0.1, "events": True}, {}):
+        sim = five_springs()
+        sim.output(tmp_path / "run", thermo_interval=0.5, overwrite=True, **more)
+        sim.run(time=1)
+        assert not sim.warnings and not recwarn.list
+    assert not list((tmp_path / "run").glob("backup*")) and (tmp_path / "run/notes.csv").read_text() == "mine"
+    assert not (tmp_path / "run/rdf.csv").exists() and not (tmp_path / "run/events.h5").exists()
+    assert sim.open().thermo["time"].tolist() == [0, 0.5, 1]
+
+
+PLAIN = """
+import h5py, sys
+with h5py.File(sys.argv[1], "r") as file:
+    print(file["particles/trajectory/position/value"].shape[0])
+"""
+
+
+def test_the_files_of_an_active_run_can_be_read(tmp_path):
+    """By carom.open() and `carom info`; other programs need a variable, which `carom info` and the page of the files name."""
+    said = []
+
+    def look(s):
+        file = tmp_path / "run/trajectory.h5md"
+        said.append((carom.open(tmp_path / "run").frames[-1].time, "time" in carom.open(tmp_path / "run").events))
+        info = subprocess.run([os.environ["CAROM"], "info", file], capture_output=True, text=True)
+        said.append((info.returncode, "HDF5_USE_FILE_LOCKING=FALSE" in info.stdout))
+        for variable in ({}, {"HDF5_USE_FILE_LOCKING": "FALSE"}):
+            done = subprocess.run([sys.executable, "-c", PLAIN, file], capture_output=True, text=True, env=os.environ | variable)
+            said.append((done.returncode, done.stdout if variable else "unable to lock file" in done.stderr))
+
+    sim = five_springs()
+    sim.output(tmp_path / "run", thermo_interval=1, frame_interval=1, events=True)
+    sim.run(time=3, callback=lambda s: look(s) if s.time == 2 else None)
+    assert said[0][0] in (1, 2) and said[0][1] and said[1] == (0, True) and said[2] == (1, True)
+    assert said[3][0] == 0 and int(said[3][1]) in (2, 3)
+    info = subprocess.run([os.environ["CAROM"], "info", tmp_path / "run"], capture_output=True, text=True)
+    assert "HDF5_USE_FILE_LOCKING" not in info.stdout
+
+
+def test_a_mean_without_an_error_says_how_long_to_run(tmp_path):
+    """Seven steps are too few, whatever they hold; eight may do. The same in summary.json and run.log."""
+    sim = five_springs()
+    sim.output(tmp_path / "run")
+    sim.run(steps=7)
+    mean = sim.means["temperature"]
+    assert np.isnan(mean["standard_error"]) and abs(mean["needed_time"] - 0.08) < 1e-12
+    assert sim.open().summary["means"]["temperature"]["needed_time"] == mean["needed_time"]
+    log = (tmp_path / "run/run.log").read_text()
+    assert "no standard error of: pressure, temperature, potential" in log and "a run to time 0.08 at least" in log
+    sim.run(steps=100)
+    walls = sim.open().summary["walls"]
+    assert {wall["collisions"] for wall in walls.values()} == {0}
+    for name in ("force_standard_error", "pressure_standard_error", "independent_samples"):
+        assert {wall[name] for wall in walls.values()} == {None}
+    sim = gas(step=0.1)
+    sim.run(time=20)
+    assert sim.means["pressure"]["standard_error"] > 0 and np.isnan(sim.means["pressure"]["needed_time"])
 
 
 @pytest.mark.parametrize("method", ["psa", "cva", "mcva", "cdda", "edda"])

@@ -34,6 +34,32 @@ def processor_seconds(process):
         return sum(map(int, file.read().rsplit(")", 1)[1].split()[11:13])) / os.sysconf("SC_CLK_TCK")
 
 
+PLACEMENT = """
+import carom
+sim = carom.Simulation(dimension=3, boundary="periodic")
+sim.add_particles(count=300000, temperature=1.0, radius=0.5)
+try:
+    print("ready", flush=True)
+    sim.place("random", packing_fraction=0.375)
+except KeyboardInterrupt:
+    print(len(sim))
+"""
+
+
+def test_ctrl_c_ends_a_placement():
+    """It would take hours; the simulation stays as it was."""
+    with subprocess.Popen([sys.executable, "-c", PLACEMENT], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "ready\n"
+        start = processor_seconds(process)
+        while processor_seconds(process) < start + 0.2:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        try:
+            assert process.communicate(timeout=60)[0] == "0\n" and process.returncode == 0
+        finally:
+            process.kill()
+
+
 @pytest.mark.parametrize("make, ahead, more", [
     ("five_springs()", 1.005, ""), ("gas()", 10.0, ""), ("gas(4096, step=1000)", 10.0, ""),
     ("five_springs()", 1.0, ", every=0.05, callback=lambda s: s.energy")])

@@ -13,10 +13,10 @@ Names and defaults are those of decks; carom.describe("edda") prints them. Units
 carom.Error, and their messages say what to do. `Simulation` and `describe` need the compiled part of the package, and `open` does not.
 """
 
-from carom.errors import Error, FileError, InitialStateError, NumericalError, UsageError
+from carom.errors import CaromWarning, Error, FileError, InitialStateError, NumericalError, UsageError
 from carom.files import Run, open
 
-__all__ = ["Error", "FileError", "InitialStateError", "NumericalError", "Run", "Simulation", "UsageError", "describe",
+__all__ = ["CaromWarning", "Error", "FileError", "InitialStateError", "NumericalError", "Run", "Simulation", "UsageError", "describe",
            "open", "version"]
 
 

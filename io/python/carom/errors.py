@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The exceptions of the package. `exit_code` is the exit code of the command for the same failure."""
+"""The exceptions and warnings of the package. `exit_code` is the exit code of the command for the same failure."""
 
 
 class Error(Exception):
@@ -30,6 +30,10 @@ class FileError(Error, OSError):
     """A file cannot be read or written, is damaged, or is of another kind."""
 
     exit_code = 5
+
+
+class CaromWarning(UserWarning):
+    """The category of the warnings of a deck and of a run. Simulation.warnings has their texts."""
 
 
 def of_exit_code(code):

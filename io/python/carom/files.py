@@ -14,7 +14,10 @@ import functools
 import json
 import os
 import pathlib
+import shutil
 import struct
+import tempfile
+import time
 import tomllib
 import zlib
 
@@ -35,7 +38,7 @@ def reading(path):
     except FileError:
         raise
     except BlockingIOError as error:
-        raise FileError(f"{path}: a process is writing this file; wait for its end, or copy the file") from error
+        raise FileError(f"{path}: a process is writing this file faster than it can be read; wait for its end") from error
     except UnicodeDecodeError as error:
         raise FileError(f"{path}: is not a text file") from error
     except OSError as error:
@@ -45,15 +48,40 @@ def reading(path):
 
 
 def open_hdf5(path):
-    """Opens an HDF5 file for reading. If a kill has interrupted a flush of the file, the flush is completed first."""
+    """Opens an HDF5 file for reading. If a kill has interrupted a flush of the file, the flush is completed first. Of a file that a run
+    is writing, a copy of its present state is opened."""
     try:
         import h5py
     except ImportError as error:
         raise ImportError("reading the files of a run needs the Python package h5py: install Debian's python3-h5py, or pip install h5py") \
             from error
 
-    complete_flush(path)
-    return h5py.File(path, "r")
+    try:
+        complete_flush(path)
+        return h5py.File(path, "r")
+    except BlockingIOError:
+        return h5py.File(copy_between_flushes(path), "r")
+
+
+def copy_between_flushes(path):
+    """A copy, without a name, of a file that a run is writing, as it was after one flush (read_between_flushes in io/files/journal.h)."""
+    journal = pathlib.Path(f"{pathlib.Path(path).resolve()}.journal")
+
+    def head():  # it changes with each flush, and begins with zeros except during a flush
+        return journal.read_bytes()[:32] if journal.exists() else b""
+
+    last_try = time.monotonic() + 10
+    while True:
+        before = head()
+        if before[:1] in (b"", b"\0"):
+            copy = tempfile.TemporaryFile()
+            with builtins.open(path, "rb") as file:
+                shutil.copyfileobj(file, copy)
+            if head() == before:
+                return copy
+        if time.monotonic() > last_try:
+            raise BlockingIOError(f"{path}: flushes come faster than it can be read")
+        time.sleep(0.002)
 
 
 def complete_flush(path):

@@ -12,7 +12,7 @@ import numpy as np
 from carom import files, formats, notebook, page, potentials
 from carom.checks import name_of, numbers, one_or_each, refuse_masked, refuse_ranks
 from carom.decks import deck_of, overrides, species_of, surroundings_of, system_of, toml_text, toml_value, write_deck
-from carom.errors import UsageError
+from carom.errors import CaromWarning, UsageError
 from carom.progress import Progress
 
 try:
@@ -79,7 +79,7 @@ class Simulation:
     def _warn(self, texts, level=3):
         self.warnings = list(texts)
         for text in texts:
-            warnings.warn(text, stacklevel=level)
+            warnings.warn(text.replace("warning: ", "", 1), CaromWarning, stacklevel=level)
 
     @classmethod
     def from_deck(cls, deck, set=None):
@@ -230,6 +230,9 @@ class Simulation:
         deck = {"format": 1, "system": system, "particles": placed + self._counted,
                 "placement": {"type": name_of("place", type), "seed": seed} | parameters,
                 "integrator": {"type": "free-flight"}, "run": {"collisions": 1}} | surroundings_of(self)
+        if old.method == "verlet":
+            deck |= {"integrator": {"type": "verlet", "step": 1.0}, "run": {"steps": 1},
+                     "particles": [{"display_radius" if key == "radius" else key: one[key] for key in one} for one in deck["particles"]]}
         if packing_fraction is not None:
             deck["placement"]["packing_fraction"] = packing_fraction
         session, texts, _ = _carom.from_deck("place", [], toml_text(deck))
@@ -283,7 +286,7 @@ class Simulation:
         self._session.add_wall(given if normal is None else given | {"normal": numbers("add_wall", "normal", normal)})
 
     def add_contact(self, one, other, **parameters):
-        """Sets the law of contacts between two species, or between a species and a wall ("x-", or its name). "*" stands for all of them.
+        """Sets the law of contacts between two species, or between a species and a wall ("x-", or its name). "*" stands for all species and all walls.
         Add species and walls first; a later law replaces an earlier one. Between two runs, the second one continues the first.
 
         Parameters are those of [[contact]] in decks: restitution, tangential, friction, rest_speed; see
@@ -341,7 +344,8 @@ class Simulation:
         [output] in decks: frame_interval, events, rdf_interval, sk_interval, msd_interval, profile_interval,
         transport_interval, pressure_tensor_interval, start, sample_start, checkpoint_wall, units, … (`carom schema`). Each
         run() ends with a checkpoint, from which from_run() and `carom run --continue` continue. Begins a new run, at time
-        0; the files of an earlier run in the directory are moved to its backup.N.
+        0; the files of an earlier run in the directory are moved to its backup.N, or removed with
+        overwrite=True.
 
             sim.output("runs/fluid", thermo_interval=0.1, frame_interval=1.0, rdf_interval=0.1)
             sim.run(time=100)
@@ -380,7 +384,8 @@ class Simulation:
     def means(self):
         """Means over time with their standard errors, up to now: ["pressure"]["mean"], ["standard_error"], ["independent_samples"]; also
         of temperature, potential, collision_rate, mean_free_time and mean_free_path. Each step, or epoch of free flight, is a sample. A
-        standard error is NaN if there are fewer than eight independent blocks of samples."""
+        standard error is NaN if there are fewer than eight independent blocks of samples; ["needed_time"] is then the time to which the
+        run must go at least, at the correlations seen so far."""
         return self._session.means()
 
     def integrator(self, type, **parameters):

@@ -52,6 +52,24 @@ TEST(Blocking, MeansScatterAsTheErrorsPredict) {
   }
 }
 
+/// A series that is extended to the number of samples that it asks for gets an error, at the latest with 200 independent
+/// samples.
+TEST(Blocking, WithoutAnErrorItSaysHowManySamplesMayGiveOne) {
+  EXPECT_EQ(Blocking(1).estimate(0).needed, 8);
+  constexpr double phi = 0.98;
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    Series series(phi, seed);
+    Blocking blocking(1);
+    Estimate e = blocking.estimate(0);
+    while (e.needed > 0) {
+      while (static_cast<double>(blocking.samples()) < e.needed) blocking.add(std::array{series.next()});
+      e = blocking.estimate(0);
+      ASSERT_EQ(std::isnan(e.error), e.needed > static_cast<double>(blocking.samples())) << seed;
+      ASSERT_LT(blocking.samples(), 200 * (1 + phi) / (1 - phi)) << seed;
+    }
+  }
+}
+
 TEST(Blocking, MostSeriesThatAreShorterThanTheirCorrelationsHaveNoError) {
   int with_error = 0;
   for (unsigned seed = 0; seed < 100; ++seed) {

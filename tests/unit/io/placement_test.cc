@@ -117,7 +117,7 @@ TEST(RandomInsertion, TellsHowFarItCame) {
   std::vector<Vec<2>> x(radius.size());
   std::vector<Id> ids(radius.size());
   std::iota(ids.begin(), ids.end(), 0);
-  const std::size_t placed = insert_at_random<2>(box, x, radius, ids, 5, 2000);
+  const std::size_t placed = insert_at_random<2>(box, x, radius, ids, 5, {}, 2000);
   EXPECT_GT(placed, 10u);
   EXPECT_LT(placed, 21u);  // at most 0.547 of the box, except for the finite size
 }

@@ -393,6 +393,21 @@ TEST(OutputDirectory, KeepsEarlierRunsInBackups) {
   EXPECT_EQ(contents(directory / "notes.txt"), "mine");
 }
 
+/// What is neither a file nor a link is moved all the same.
+TEST(OutputDirectory, ReplacesEarlierRunsOnRequest) {
+  const auto directory = fresh_directory();
+  for (const char* name : {run_file::trajectory, run_file::log, "rdf.csv", "rdf.csv.part"})
+    std::ofstream(directory / name) << name;
+  for (const char* name : {"notes.csv", "trajectory.h5md.old"}) std::ofstream(directory / name) << "mine";
+  fs::create_symlink("notes.csv", directory / run_file::thermo);
+  EXPECT_FALSE(prepare_output_directory(directory, true));
+  EXPECT_EQ(std::distance(fs::directory_iterator(directory), fs::directory_iterator()), 2);
+  for (const char* name : {"notes.csv", "trajectory.h5md.old"}) EXPECT_EQ(contents(directory / name), "mine");
+  fs::create_directory(directory / run_file::summary);
+  EXPECT_EQ(prepare_output_directory(directory, true), directory / "backup.1");
+  EXPECT_TRUE(fs::is_directory(directory / "backup.1" / run_file::summary));
+}
+
 /// Journals and unfinished parts are moved with the files of the earlier run.
 TEST(OutputDirectory, WhatAKillHasLeftGoesWithTheFiles) {
   const auto directory = fresh_directory();
