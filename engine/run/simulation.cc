@@ -46,10 +46,10 @@ void check_spheres(const System<D>& system) {
                                             short_text(overlaps.distance) + "; move them apart");
 }
 
-/// The length of the slab that starts then: to the end of the run, if this is less than a step.
+/// The length of the slab that starts then: to the end of the run, if this is less than a step by more than rounding.
 double length_from(double start, const Plan& plan) {
-  const bool last = plan.end_time && start + plan.step > *plan.end_time - plan.slack();
-  return last ? *plan.end_time - start : plan.step;
+  const double left = plan.end_time.value_or(std::numeric_limits<double>::infinity()) - start;
+  return left < plan.step - plan.slack() ? left : plan.step;
 }
 
 void check_interval(double interval, double step) {
@@ -102,6 +102,16 @@ Plan checked(const Plan& plan) {
   return plan;
 }
 }  // namespace
+
+std::array<double, 2> ramp_times(const Plan& plan, std::int64_t start_step, double start_time) {
+  if (!plan.steps && !plan.end_time)
+    throw Error(Failure::deck,
+                "the temperature of the bath is a ramp over a run without a last time; give run.steps or "
+                "run.end_time, or the ramp_time of the bath, or one temperature");
+  double end = plan.end_time.value_or(std::numeric_limits<double>::infinity());
+  if (plan.steps) end = std::min(end, start_time + static_cast<double>(*plan.steps - start_step) * plan.step);
+  return {start_time, end};
+}
 
 template <int D>
 Simulation<D>::Simulation(std::unique_ptr<System<D>>&& system, const IntegratorInfo& info,
@@ -337,19 +347,14 @@ void Simulation<D>::act_of_bath(const Slab& slab, SlabReport<D>& report) {
   if (bath.kicks() && info_.stepping) kick_all(*system_, slab.start, slab.length, report.counters);
 }
 
-/// Sets the times of a ramp of the bath's temperature, unless an earlier plan has set them.
+/// Sets the times of a ramp of the bath's temperature, unless they are given or an earlier plan has set them.
 template <int D>
 void Simulation<D>::set_ramp() {
   Bath& bath = system_->box.bath;
-  if (bath.type == Bath::Type::none || !bath.has_ramp() || bath.ramp_end > bath.ramp_start) return;
-  if (!plan_.steps && !plan_.end_time)
-    throw Error(Failure::deck,
-                "the temperature of the bath is a ramp over a run without a last time; give run.steps or "
-                "run.end_time, or one temperature");
-  const Statistics& s = statistics_;
-  bath.ramp_start = bath.ramp_end = s.start_time;
-  if (plan_.steps) bath.ramp_end += static_cast<double>(*plan_.steps - s.start_steps) * plan_.step;
-  if (plan_.end_time) bath.ramp_end = plan_.steps ? std::min(bath.ramp_end, *plan_.end_time) : *plan_.end_time;
+  if (!bath.needs_ramp_time()) return;
+  const auto [start, end] = ramp_times(plan_, statistics_.start_steps, statistics_.start_time);
+  bath.ramp_start = start;
+  bath.ramp_end = end;
 }
 
 /// For free flight that ends only after a number of collisions: throws if the spheres have separated for good.

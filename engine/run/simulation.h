@@ -38,8 +38,15 @@ struct Plan {
   /// of a step or epoch (engine/run/transient.h); needs a thermo_interval.
   bool from_equilibrium = false;
 
-  double slack() const { return 1e-9 * step; }  ///< tolerance of due times and ends [time]
+  /// Tolerance of due times and ends: more than the rounding of a time near the end [time].
+  double slack() const {
+    return std::max(1e-9 * step, 4 * std::numeric_limits<double>::epsilon() * end_time.value_or(0));
+  }
 };
+
+/// The first and last time of a run that starts at this step and time: those of a ramp of the bath's temperature for
+/// which none are given. Throws Error(Failure::deck) if the plan has no last time.
+std::array<double, 2> ramp_times(const Plan& plan, std::int64_t start_step, double start_time);
 
 /// The load on a wall between two thermo rows.
 struct WallLoad {

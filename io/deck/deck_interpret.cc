@@ -454,11 +454,13 @@ class Interpreter {
     table->read<std::int64_t>("collisions", deck_.plan.collisions);
     if (!table->given("steps") && !table->given("end_time") && !table->given("collisions"))
       problems_.error(table->at, "[run] has no end", "give steps, end_time or collisions");
-    const auto ramp = [](const TableConfig& bath) { return bath.parameters.find<std::vector<double>>("temperature"); };
+    const auto ramp = [](const TableConfig& bath) {
+      return bath.parameters.find<std::vector<double>>("temperature") && !bath.parameters.has("ramp_time");
+    };
     if (const auto at = std::ranges::find_if(source_.baths, ramp);
         at != source_.baths.end() && table->given("collisions") && !table->given("steps") && !table->given("end_time"))
       problems_.error(at->at, "the temperature is a ramp over a run without a last time",
-                      "give run.steps or run.end_time, or one temperature");
+                      "give run.steps or run.end_time, or the ramp_time of the bath, or one temperature");
     if (source_.integrator != nullptr && !source_.integrator->hard_cores && table->given("collisions") &&
         !table->given("steps") && !table->given("end_time"))
       problems_.error(table->place("collisions"),
