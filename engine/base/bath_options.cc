@@ -18,8 +18,7 @@ const std::vector<Parameter>& bath_parameters() {
        "rescaling: all velocities are scaled by a common random factor, so that the kinetic energy is canonical",
        Range::any,
        {"andersen", "rescaling"}},
-      {"temperature", real_or_list, "", "energy", "a number, or [first, last]: a linear ramp",
-       Range::positive},
+      {"temperature", real_or_list, "", "energy", "a number, or [first, last]: a linear ramp", Range::positive},
       {"ramp_time", real_list, "none", "time",
        "[start, end] of the ramp, before and after which the temperature is constant; default: start and end of the "
        "run. It stays if the run is continued to another end"},

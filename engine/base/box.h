@@ -23,11 +23,11 @@ struct WallOptions {
   Vec<D> normal = Vec<D>::Zero();  ///< a further wall: points to the side of the spheres; any length
   double offset = 0;               ///< a further wall: normal·x = offset at time 0
   double velocity = 0;             ///< along the normal [length/time]
-  double amplitude = 0;    ///< shaken: the displacement along the normal is amplitude·sin(2π(turns + frequency·time))
-  double frequency = 0;    ///< [1/time]
-  double turns = 0;        ///< phase of the sine at time 0, in turns
-  bool one_sided = true;   ///< false: it acts on the spheres on both sides
-  bool one_way = false;    ///< it reflects spheres that come from the side of the normal, and lets others pass
+  double amplitude = 0;   ///< shaken: the displacement along the normal is amplitude·sin(2π(turns + frequency·time))
+  double frequency = 0;   ///< [1/time]
+  double turns = 0;       ///< phase of the sine at time 0, in turns
+  bool one_sided = true;  ///< false: it acts on the spheres on both sides
+  bool one_way = false;   ///< it reflects spheres that come from the side of the normal, and lets others pass
   double temperature = 0;  ///< a thermal wall has one [energy]; 0: the wall is not thermal
   std::uint64_t seed = 1;  ///< seed of the random numbers of a thermal wall
   double moved = 0;        ///< displacement before time 0, of the centre of a sine [length]

@@ -21,7 +21,8 @@ const std::vector<Parameter>& wall_parameters() {
         {"offset", real, "0.0", "length", "a further wall: at the start it is at normal·x = offset"},
         velocity,
         {"moved", real, "0.0", "length",
-         "how far it has moved along its normal before the start, from the face of the box or its offset; a shaken wall: "
+         "how far it has moved along its normal before the start, from the face of the box or its offset; a shaken "
+         "wall: "
          "the centre of its motion"},
         {"phase", real, "0.0", "-", "a shaken wall: the part of an oscillation that is over at the start"},
         {"temperature", real, "none", "energy",

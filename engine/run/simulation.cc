@@ -19,6 +19,13 @@ constexpr double kLeastInterval = 1e-6;
 /// The longest epoch of a gas that has cooled, in steps: a gas slower than this is at rest to the rounding of
 /// positions.
 constexpr double kLongestEpoch = 1e9;
+/// More kicks of a particle in a step change nothing: that its velocity then stems from a kick has the probability
+/// 1 − e⁻¹⁰⁰.
+constexpr double kMostKicks = 100;
+/// Beyond this number of cells of the length 1/rate, which bath.cc counts, the doubles are farther apart than a cell.
+constexpr double kMostCells = 0x1p52;
+/// After so many oscillations of a shaken wall its phase is known to 10⁻⁶.
+constexpr double kMostOscillations = 1e9;
 /// Flight distance without any pair collision after which a run in an open box ends [longest edge].
 constexpr double kFarApart = 1e4;
 
@@ -49,7 +56,7 @@ void check_spheres(const System<D>& system) {
 /// The length of the slab that starts then: to the end of the run, if this is less than a step by more than rounding.
 double length_from(double start, const Plan& plan) {
   const double left = plan.end_time.value_or(std::numeric_limits<double>::infinity()) - start;
-  return left < plan.step - plan.slack() ? left : plan.step;
+  return left < plan.step - plan.end_slack() ? left : plan.step;
 }
 
 void check_interval(double interval, double step) {
@@ -90,6 +97,25 @@ void check_fixed(const System<D>& system, const IntegratorInfo& info) {
     throw Error(Failure::deck, std::string(info.name) +
                                    " knows no fixed particles in a uniform-field, where all particles have the same "
                                    "acceleration; take psa, edda or their relatives");
+}
+
+/// Throws if the bath kicks, or a wall oscillates, too often for the slab.
+template <int D>
+void check_rates(const Box<D>& box, const Slab& slab, bool stepping) {
+  const double end = slab.start + slab.length, kicks = box.bath.rate * slab.length;
+  if (box.bath.kicks() && ((stepping && kicks > kMostKicks) || box.bath.rate * end > kMostCells))
+    throw Error(Failure::numerical, "the bath would kick each particle " + short_text(kicks) + " times in " +
+                                        short_text(slab.length) + " units of time" +
+                                        (stepping ? ", and only the last kick matters; take a rate of at most " +
+                                                        short_text(kMostKicks / slab.length)
+                                                  : "; take a smaller rate"));
+  for (const WallOptions<D>& each : box.options)
+    if (each.frequency * end > kMostOscillations)
+      throw Error(Failure::numerical,
+                  box.wall_name(each.number) + " would oscillate " + short_text(each.frequency * end) +
+                      " times until time " + short_text(end) +
+                      ", so often that its phase is lost to rounding; take a frequency of at most " +
+                      short_text(kMostOscillations / end) + ", or end the run earlier");
 }
 
 Plan checked(const Plan& plan) {
@@ -313,6 +339,7 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
       watch.begin();
       system_->box.begin_step(slab.start, info_.stepping ? slab.length : 0);
       if (!system_->box.options.empty()) system_->box.check(Failure::numerical);
+      check_rates(system_->box, slab, info_.stepping);
       if (ContactLaws& laws = system_->box.contacts; !laws.elastic()) {
         laws.thermal_speed = thermal_speed(*system_);
         laws.slow = info_.stepping ? 0 : 1;
@@ -418,16 +445,18 @@ Slab Simulation<D>::next_slab() const {
   slab.steps = count_.stride;
   if (plan_.steps) slab.steps = std::min(slab.steps, *plan_.steps - slab.index);
   if (plan_.end_time) {
-    const double left = *plan_.end_time - plan_.slack() - time_of(slab.index);
+    const double left = *plan_.end_time - plan_.end_slack() - time_of(slab.index);
     slab.steps = static_cast<std::int64_t>(std::min(static_cast<double>(slab.steps), left / plan_.step));
   }
   slab.steps = std::max<std::int64_t>(slab.steps, 1);
   const double length =
       slab.steps == 1 ? length_from(time_of(slab.index), plan_) : static_cast<double>(slab.steps) * plan_.step;
   slab.length = length - count_.within;
-  if (!info_.stepping)
+  if (!info_.stepping) {
+    slab.contact_limit = 2 * most_collisions_;
     slab.collision_limit = std::min(statistics_.counters.sphere_sphere + most_collisions_,
                                     plan_.collisions.value_or(slab.collision_limit));
+  }
   return slab;
 }
 
@@ -435,7 +464,7 @@ template <int D>
 bool Simulation<D>::finished() const {
   const Statistics& s = statistics_;
   return (plan_.steps && s.steps >= *plan_.steps) ||
-         (plan_.end_time && s.end_time >= *plan_.end_time - plan_.slack()) ||
+         (plan_.end_time && s.end_time >= *plan_.end_time - plan_.end_slack()) ||
          (plan_.collisions && s.counters.sphere_sphere >= *plan_.collisions);
 }
 

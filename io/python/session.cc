@@ -214,7 +214,8 @@ void Session<D>::add_wall(Parameters given) {
   if (running_) refuse("a run is going on; change walls before it or after it");
   std::vector<Parameters> all = walls();
   const auto* name = given.find<std::string>("name");
-  const auto old = std::ranges::find_if(all, [&](const Parameters& each) { return name && each.text("name") == *name; });
+  const auto old =
+      std::ranges::find_if(all, [&](const Parameters& each) { return name && each.text("name") == *name; });
   if (old == all.end()) {
     all.push_back(completed("wall", wall_parameters(), std::move(given)));
   } else {

@@ -44,6 +44,9 @@ def function_of(expression, constants):
                          f"{', '.join(FUNCTIONS)}")
     if "r" not in names:
         raise UsageError(f"potential: '{expression}' does not depend on r; give an expression of r, the distance")
+    for name, number in constants.items():
+        if not isinstance(number, numbers.Real):
+            raise UsageError(f"potential: '{name}' is {number!r}; give a number")
     known = {"__builtins__": {}} | FUNCTIONS | constants
     return lambda r: _values(f"'{expression}'", r, lambda: eval(code, known | {"r": r}))
 
