@@ -216,7 +216,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
   }
   if (again) {
     // The last slab was shortened to meet the previous end of the run.
-    if (s.end_time != next_slab().start) {
+    if (std::abs(s.end_time - next_slab().start) > plan_.end_slack()) {
       count_.steps = s.steps;
       count_.time = s.end_time;
       count_.within = count_.boxes = 0;
@@ -314,6 +314,8 @@ void Simulation<D>::run(const Hooks& hooks) {
     monitor_->end_of_slab(report.reached, *integrator_, finished());
     for (auto* observer : observers_) observer->progress(s);
   }
+  // Rows and frames have the time of the step, as in a longer run.
+  if (plan_.end_time && std::abs(s.end_time - *plan_.end_time) <= plan_.end_slack()) s.end_time = *plan_.end_time;
   monitor_->finish();
   system_->decomposition.to_blocks();
   take_time();
@@ -358,8 +360,11 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
       return false;
     } catch (const Error& e) {
       if (e.failure() != Failure::numerical) throw;
-      const std::string what =
-          cramped(2 * slab.length);  // squeezed spheres collide ever faster before there is no room
+      std::string what = cramped(2 * slab.length);  // squeezed spheres collide ever faster before there is no room
+      for (const WallOptions<D>& each : system_->box.options)  // at the ends of oscillations
+        for (const double turns : {0.25, 0.75})
+          if (const double left = turns - each.turns - each.frequency * slab.start; each.amplitude != 0 && what.empty())
+            what = cramped((left - std::floor(left)) / each.frequency);
       throw error(what.empty() ? e.what() : what);
     }
 }

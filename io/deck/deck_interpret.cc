@@ -86,7 +86,8 @@ class Interpreter {
       for (TableConfig& wall : source_.walls)
         if (!wall.wrong) wall.wrong = report(wall.at, [&] { add_wall(box, wall.parameters); });
       for (TableConfig& contact : source_.contacts)
-        if (!contact.wrong) contact.wrong = report(contact.at, [&] { add_contact(box, names, contact.parameters); });
+        if (!contact.wrong && !names.empty())
+          contact.wrong = report(contact.at, [&] { add_contact(box, names, contact.parameters); });
       if (source_.edges.size() != dimension_ || source_.walls.empty()) return;
       std::copy_n(source_.edges.begin(), dimension_, box.edges.begin());
       report(source_.walls.back().at, [&] { box.check(Failure::deck); });
@@ -403,6 +404,7 @@ class Interpreter {
 
   void ids_exist(const ValueTable& table) {
     const std::size_t n = source_.particles();
+    if (n == 0 || std::ranges::count(source_.species, 0u, &SpeciesConfig::count) > 0) return;  // an error of its own
     table.each_key([&](const Parameter& key) {
       const auto* pairs = table.find<PairList>(key.name);
       if (pairs == nullptr) return;

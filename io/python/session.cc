@@ -259,7 +259,7 @@ void Session<D>::add_contact(Parameters given) {
 /// To be called before a change that lets the run go on: the state from which it continues must be the present one.
 template <int D>
 void Session<D>::need_state_at_end(const char* what) const {
-  if (shown_until_ < 0 || state_time_ == statistics_.end_time) return;
+  if (shown_until_ < 0 || std::abs(state_time_ - statistics_.end_time) <= 1e-9 * step_) return;
   refuse(
       std::string(what) + ": the last run ended at time " + short_text(statistics_.end_time) +
       ", within a step or an epoch of free flight; end runs at whole steps, for example by integrator(\"free-flight\", "
@@ -375,6 +375,7 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
     };
   const auto end = [&] {
     statistics_ = *std::exchange(live_, nullptr);
+    if (shot_ && std::abs(shot_->time - statistics_.end_time) <= 1e-9 * step_) shot_->time = statistics_.end_time;
     shown_until_ = std::max(shown_until_, statistics_.end_time);
     averages_ = averages();
     record_ = nullptr;
