@@ -20,13 +20,14 @@ struct Bath {
 
   Type type = Type::none;
   double temperature = 1, last_temperature = 1;  ///< at the start and at the end of a linear ramp [energy]
-  double ramp_start = 0, ramp_end = 0;           ///< set by Simulation [time]
-  double rate = 1;         ///< kicks of a particle per unit time; rescaling: 1/relaxation time [1/time]
-  std::uint64_t seed = 1;  ///< seed of the random numbers
+  double ramp_start = 0, ramp_end = 0;  ///< Simulation sets them to the ends of the run if they are equal [time]
+  double rate = 1;                      ///< kicks of a particle per unit time; rescaling: 1/relaxation time [1/time]
+  std::uint64_t seed = 1;               ///< seed of the random numbers
 
   bool kicks() const { return type == Type::andersen; }
   bool rescales() const { return type == Type::rescaling; }
   bool has_ramp() const { return temperature != last_temperature; }
+  bool needs_ramp_time() const { return type != Type::none && has_ramp() && ramp_start == ramp_end; }
   void set_temperature(double constant) { temperature = last_temperature = constant; }
   double temperature_at(double time) const {
     if (!has_ramp() || time <= ramp_start) return temperature;

@@ -18,8 +18,10 @@ const std::vector<Parameter>& bath_parameters() {
        "rescaling: all velocities are scaled by a common random factor, so that the kinetic energy is canonical",
        Range::any,
        {"andersen", "rescaling"}},
-      {"temperature", real_or_list, "", "energy", "a number, or [first, last]: a linear ramp over the run",
-       Range::positive},
+      {"temperature", real_or_list, "", "energy", "a number, or [first, last]: a linear ramp", Range::positive},
+      {"ramp_time", real_list, "none", "time",
+       "[start, end] of the ramp, before and after which the temperature is constant; default: start and end of the "
+       "run. It stays if the run is continued to another end"},
       {"rate", real, "", "1/time", "kicks of a particle per unit time; rescaling: 1/relaxation time", Range::positive},
       {"seed", integer, "none", "-", "seed of the random numbers; default: that of [placement]", Range::non_negative}};
   return all;
@@ -37,6 +39,12 @@ Bath bath_of(const Parameters& given, std::uint64_t seed) {
                                      " numbers; give one, or the first and the last of a ramp");
     bath.temperature = ramp->front();
     bath.last_temperature = ramp->back();
+  }
+  if (const auto* times = given.find<std::vector<double>>("ramp_time")) {
+    if (times->size() != 2 || !(times->front() < times->back()))
+      throw Error(Failure::deck, "the ramp_time of the bath is not two times, one after the other; give [start, end]");
+    bath.ramp_start = times->front();
+    bath.ramp_end = times->back();
   }
   return bath;
 }

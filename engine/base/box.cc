@@ -28,7 +28,8 @@ void Box<D>::add(WallOptions<D> wall) {
   const auto faces = face_names<D>();
   const auto face = std::ranges::find(faces, wall.name);
   const double length = wall.normal.norm();
-  if (!std::isfinite(length + wall.offset + wall.velocity + wall.amplitude + wall.frequency + wall.temperature))
+  if (!std::isfinite(length + wall.offset + wall.velocity + wall.amplitude + wall.frequency + wall.temperature +
+                     wall.moved + wall.turns))
     refuse("has a number that is not finite", "give finite ones");
   if (std::ranges::find(options, wall.name, &WallOptions<D>::name) != options.end())
     refuse("is given twice", "give each wall its own name");
@@ -92,13 +93,13 @@ void Box<D>::set_motion(const WallOptions<D>& its, Wall<D>& wall) const {
   if (step == 0) {
     wall.amplitude = its.amplitude;
     wall.frequency = its.frequency;
-    wall.turns = its.frequency * time;
+    wall.turns = its.turns + its.frequency * time;
     return;
   }
   const auto [cos_half, sin_half] = cosine_and_sine(0.5 * its.frequency * step);
-  const auto [cos, sin] = cosine_and_sine(its.frequency * step_start);
+  const auto [cos, sin] = cosine_and_sine(its.turns + its.frequency * step_start);
   const double omega = 2 / step * (sin_half / cos_half), s = time - step_start;
-  const double end = cosine_and_sine(its.frequency * (step_start + step))[1];
+  const double end = cosine_and_sine(its.turns + its.frequency * (step_start + step))[1];
   if (straight) {
     wall.velocity = its.amplitude * (end - sin) / step;
     wall.offset += its.amplitude * sin + s * wall.velocity;
@@ -111,8 +112,9 @@ void Box<D>::set_motion(const WallOptions<D>& its, Wall<D>& wall) const {
 
 template <int D>
 void Box<D>::restart() {
-  for (WallOptions<D>& each : options) each.moved = each.displacement(time);
-  bath.ramp_start = bath.ramp_end = 0;
+  for (WallOptions<D>& each : options) each.restart(time);
+  bath.ramp_start -= time;
+  bath.ramp_end -= time;
   begin_step(0, 0);
 }
 

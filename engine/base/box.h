@@ -25,13 +25,14 @@ struct WallOptions {
   Vec<D> normal = Vec<D>::Zero();  ///< a further wall: points to the side of the spheres; any length
   double offset = 0;               ///< a further wall: normal·x = offset at time 0
   double velocity = 0;             ///< along the normal [length/time]
-  double amplitude = 0;    ///< shaken: the displacement along the normal is amplitude·sin(2π·frequency·time)
-  double frequency = 0;    ///< [1/time]
-  bool one_sided = true;   ///< false: it acts on the spheres on both sides
-  bool one_way = false;    ///< it reflects spheres that come from the side of the normal, and lets others pass
+  double amplitude = 0;   ///< shaken: the displacement along the normal is amplitude·sin(2π(turns + frequency·time))
+  double frequency = 0;   ///< [1/time]
+  double turns = 0;       ///< phase of the sine at time 0, in turns
+  bool one_sided = true;  ///< false: it acts on the spheres on both sides
+  bool one_way = false;   ///< it reflects spheres that come from the side of the normal, and lets others pass
   double temperature = 0;  ///< a thermal wall has one [energy]; 0: the wall is not thermal
   std::uint64_t seed = 1;  ///< seed of the random numbers of a thermal wall
-  double moved = 0;        ///< displacement before time 0 [length]
+  double moved = 0;        ///< displacement before time 0, of the centre of a sine [length]
   Id number = 0;           ///< set by add(); the rear of a wall with two sides has the next number
 
   /// Whether it moves or has moved.
@@ -39,7 +40,12 @@ struct WallOptions {
   /// How far it has moved along its normal.
   double displacement(double time) const {
     const double smooth = moved + velocity * time;
-    return amplitude == 0 ? smooth : smooth + amplitude * cosine_and_sine(frequency * time)[1];
+    return amplitude == 0 ? smooth : smooth + amplitude * cosine_and_sine(turns + frequency * time)[1];
+  }
+  /// Makes `time` its time 0: it stays where it is and goes on as it moves.
+  void restart(double time) {
+    moved += velocity * time;
+    if (amplitude != 0) turns = std::fmod(turns + frequency * time, 1.0);
   }
 };
 
@@ -124,7 +130,7 @@ struct Box {
     time = step_start = start;
     step = length;
   }
-  /// Makes the present time the time 0 of a new run, with all walls where they are and ramps at their starts.
+  /// Makes the present time the time 0 of a new run; walls and ramps go on.
   void restart();
   /// Throws Error(failure) if two parallel walls leave no room between them, or a step is too long for a shaken wall.
   void check(Failure failure) const;

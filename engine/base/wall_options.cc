@@ -9,7 +9,7 @@ const std::vector<Parameter>& wall_parameters() {
   static const std::vector<Parameter> all = [] {
     Parameter velocity{"velocity", real_or_table, "0.0", "length/time",
                        "along the normal, constant; or { amplitude, frequency }: shaken, displaced along the normal by "
-                       "amplitude·sin(2π·frequency·time)"};
+                       "amplitude·sin(2π(frequency·time + phase))"};
     velocity.keys = {{"amplitude", real, "", "length", "the largest displacement"},
                      {"frequency", real, "", "1/time", "oscillations per unit of time", Range::positive}};
     return std::vector<Parameter>{
@@ -20,6 +20,11 @@ const std::vector<Parameter>& wall_parameters() {
          "a further wall: a vector of any length that points to the side of the spheres"},
         {"offset", real, "0.0", "length", "a further wall: at the start it is at normal·x = offset"},
         velocity,
+        {"moved", real, "0.0", "length",
+         "how far it has moved along its normal before the start, from the face of the box or its offset; a shaken "
+         "wall: "
+         "the centre of its motion"},
+        {"phase", real, "0.0", "-", "a shaken wall: the part of an oscillation that is over at the start"},
         {"temperature", real, "none", "energy",
          "makes a thermal wall: after a contact the velocity relative to the wall is that of a gas of this temperature "
          "behind the wall",
@@ -53,6 +58,8 @@ void add_wall(Box<D>& box, const Parameters& given, std::uint64_t seed) {
     wall.amplitude = std::get<double>(shaken->at("amplitude"));
     wall.frequency = std::get<double>(shaken->at("frequency"));
   }
+  wall.moved = given.real("moved");
+  wall.turns = given.real("phase");
   box.add(std::move(wall));
 }
 

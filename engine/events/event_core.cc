@@ -143,12 +143,12 @@ double EventCore<D>::run(double end, const Report& report) {
     if (a.kind == EventKind::wall) {
       collide_wall(i, now, generation, report);
       search_.plan(i, now);
-      continue;
+    } else {
+      const Slot j = flights_.packing().slot(a.partner);
+      collide_pair(i, j, a.partner, now, generation, report);
+      search_.plan_two(i, j, now);
     }
-    const Slot j = flights_.packing().slot(a.partner);
-    collide_pair(i, j, a.partner, now, generation, report);
-    search_.plan_two(i, j, now);
-    if (report.counters.sphere_sphere >= report.collision_limit) {
+    if (report.counters.sphere_sphere >= report.collision_limit || events_ >= report.contact_limit) {
       end = now;
       break;
     }

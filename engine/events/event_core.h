@@ -32,6 +32,7 @@ class EventCore {
     std::vector<Contact<D>>* contacts = nullptr;
     std::uint64_t collision_limit = std::numeric_limits<std::uint64_t>::max();  ///< largest counters.sphere_sphere
     std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max();       ///< most contacts since load()
+    std::uint64_t contact_limit = std::numeric_limits<std::uint64_t>::max();    ///< contacts since load(): run() ends
     Trace<D>* trace = nullptr;  ///< records paths if given; contacts are then not counted, because they may be revoked
   };
 
@@ -56,8 +57,8 @@ class EventCore {
   /// pending.
   void give_back(double time, Particles<D>& particles);
 
-  /// Executes every event before `end`, or up to the collision limit; returns the time reached: `end`, or that of the
-  /// last collision. Throws Error(Failure::numerical) if more than max_events contacts are needed.
+  /// Executes every event before `end`, or up to one of the limits; returns the time reached: `end`, or that of the
+  /// last contact. Throws Error(Failure::numerical) if more than max_events contacts are needed.
   double run(double end, const Report& report);
 
   /// The time of the current or last event.

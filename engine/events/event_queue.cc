@@ -42,7 +42,7 @@ EventKey<D> EventQueue<D>::key_of(Slot i) const {
 template <int D>
 void EventQueue<D>::offer(Slot i, double time, EventKind kind, std::uint32_t partner) {
   NextEvent<D>& a = next_events_[i];
-  if (time > a.contact || time == kNever) return;
+  if (!(time <= a.contact) || time == kNever) return;  // no number: the next look at the energy ends the run
   const NextEvent<D> before = a;
   const EventKey<D> rival = time == a.contact ? key_of(i) : EventKey<D>{};
   a.contact = time;

@@ -156,6 +156,10 @@ double Flights<D>::wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall)
     return r.t + return_time(wall.clearance(r.x, at_record, r.t), opening, wall.speeding(g_), rest);
   const double s = wall.amplitude == 0 ? wall_contact_time(gap, opening, wall.speeding(g_), rest, touching, slack)
                                        : shaken_contact(r, at_record, rate, wall, touching, slack);
+  if (!std::isfinite(slack))
+    throw Error(Failure::numerical, "the speed of particle " + std::to_string(r.id) +
+                                        " is too large: its square is no number; give smaller velocities, "
+                                        "temperatures and accelerations");
   if (s == 0 && !(opening < -slack) && !wall.thermal())
     throw Error(Failure::numerical,
                 "particle " + std::to_string(r.id) + " rests on " + box_.wall_name(wall.number) +

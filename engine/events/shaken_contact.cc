@@ -31,6 +31,8 @@ double ShakenGap::first_contact(double rest, bool touching, double slack) const 
   const double reach = std::abs(amplitude), omega = kTwoPi * frequency;
   const double most = std::max(omega * omega * reach - a, kEpsilon * omega * omega * reach);
   const double scale = std::abs(y) + reach;
+  // Rounding moves a phase by as much: a shorter step might not come on.
+  const auto least = [&](double at) { return 2 * kEpsilon * (at + std::abs(turns) / frequency); };
   double s = 0;
   if (touching) {
     const double departing = slope(0);
@@ -54,7 +56,7 @@ double ShakenGap::first_contact(double rest, bool touching, double slack) const 
     if (gap <= 4 * kEpsilon * scale && falling > 0) return s < rest ? s : kNever;
     const double root = std::sqrt(falling * falling + 2 * most * std::max(gap, 0.0));
     const double ahead = falling > 0 ? 2 * gap / (root + falling) : (root - falling) / most;
-    const double next = s + std::max(ahead, 2 * kEpsilon * s);
+    const double next = s + std::max(ahead, least(s));
     if (next == s) return falling > 0 ? s : kNever;
     s = next;
   }

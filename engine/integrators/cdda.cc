@@ -33,6 +33,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
 
   void start(System<D>& system, Counters&) override {
     scan_.emplace(system, max_events_, reactions_);
+    scan_->rest().let_open();
     system.fields.add_value("reactions", reactions_);
     piece_.emplace(system, order_);
     contacts_.emplace(system, *scan_);

@@ -16,7 +16,9 @@ namespace carom::integrator {
 template <int D>
 class VerletPieces {
  public:
-  VerletPieces(System<D>& system, std::uint64_t max_events) : system_(system), scan_(system, max_events, reactions_) {}
+  VerletPieces(System<D>& system, std::uint64_t max_events) : system_(system), scan_(system, max_events, reactions_) {
+    scan_.rest().let_open();
+  }
 
   void start(Counters& counters) {
     accelerations_.start(system_, counters);

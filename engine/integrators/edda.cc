@@ -174,6 +174,12 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
                         std::to_string(kMostPieces) +
                         " of the step: they have no room between their neighbours or walls; leave gaps between "
                         "spheres that fill a box from wall to wall, or use a smaller integrator.step");
+      if (longest * kMostPieces < slab.length && resting() && !system.box.contacts.elastic())
+        throw Error(Failure::numerical, "the sweeps do not converge even in " + std::to_string(kMostPieces) +
+                                            " pieces of a step with " + std::to_string(scan.resting().size()) +
+                                            " contacts at rest" + (held_ ? "" : ", whose reactions are not found") +
+                                            "; give the contacts a larger rest_speed, for instance a thousandth of the "
+                                            "speeds of impacts, or, if the forces are stiff, use a smaller step");
       if (longest * kMostPieces < slab.length)
         throw Error(Failure::numerical, "the sweeps do not converge even in " + std::to_string(kMostPieces) +
                                             " pieces; the forces, strongest on particle " +

@@ -65,11 +65,14 @@ class FreeFlight : public Integrator<D> {
       flight.give_back(reached, system.particles);
       time = start + reached;
     };
-    // Runs to `end` or to the collision limit; returns whether it reached `end`.
+    // Runs to `end` or to a limit; returns whether it reached `end`.
+    const std::uint64_t contacts = report.counters.contacts();
     const auto run = [&](double end) {
       const Stopwatch watch(report.counters.seconds.queue);
-      report.reached = flight.run(end, {report.counters, report.contacts, slab.collision_limit, most});
-      return report.reached == end && report.counters.sphere_sphere < slab.collision_limit;
+      report.reached =
+          flight.run(end, {report.counters, report.contacts, slab.collision_limit, most, slab.contact_limit});
+      return report.reached == end && report.counters.sphere_sphere < slab.collision_limit &&
+             report.counters.contacts() - contacts < slab.contact_limit;
     };
     const auto observe = [&](double due) {
       if (!run(due)) return false;

@@ -25,6 +25,8 @@ struct Slab {
   std::int64_t steps = 1;  ///< in this length; more than one only in free flight
   /// Free flight stops at this many pair collisions (counted by Counters::sphere_sphere from the start of the run).
   std::uint64_t collision_limit = std::numeric_limits<std::uint64_t>::max();
+  /// Free flight stops at this many contacts in the slab, those with walls and the kicks of a bath included.
+  std::uint64_t contact_limit = std::numeric_limits<std::uint64_t>::max();
 };
 
 /// The inputs and outputs of a slab beside the motion.
@@ -37,7 +39,7 @@ struct SlabReport {
   SlabWatch* watch = nullptr;  ///< lets stepping methods abandon a long slab; null: it is always completed
   double boxes = 0;            ///< set by free flight: PastEpoch::boxes of this slab and rank
   double reached =
-      0;  ///< set by the integrator: the time reached within the slab; below the length only at collision_limit
+      0;  ///< set by the integrator: the time reached within the slab; below the length only at a limit
 };
 
 template <int D>

@@ -76,12 +76,13 @@ void WindowedFlight<D>::reload() {
   });
 }
 
-/// The key of the n-th pair collision of a window over all ranks, n from 1. Collective.
+/// The key of the n-th contact of a window over all ranks, or of the n-th one of pairs, n from 1. Collective.
 template <int D>
-EventKey<D> WindowedFlight<D>::key_of_collision(std::uint64_t number) {
+EventKey<D> WindowedFlight<D>::key_of_contact(std::uint64_t number, bool pairs) {
   std::vector<EventKey<D>> mine;
   subdomain_.for_each_contact([&](Slot i, std::size_t k) {
-    if (const EventKey<D> key = subdomain_.paths().node(i, k).key; key.kind == EventKind::pair) mine.push_back(key);
+    const EventKey<D> key = subdomain_.paths().node(i, k).key;
+    if (!pairs || key.kind == EventKind::pair) mine.push_back(key);
   });
   auto keys = gather_values<EventKey<D>>(ranks_, mine);
   std::ranges::nth_element(keys, keys.begin() + static_cast<std::ptrdiff_t>(number - 1));
@@ -134,16 +135,18 @@ double WindowedFlight<D>::run(double end, const Report& report) {
     if (!subdomain_.paths().all_match())
       throw Error(Failure::numerical, "internal error: subdomains do not agree about a window; please report this");
     got = subdomain_.paths().tally();
-    if (collisions + sums[2] >= report.collision_limit) {  // it may have been reached
-      std::uint64_t count = got.sphere_sphere;
+    const auto end_at = [&](std::uint64_t before, std::uint64_t limit, bool pairs) {
+      if (before + sums[2] < limit) return;  // else it may have been reached
+      std::uint64_t count = pairs ? got.sphere_sphere : got.contacts();
       ranks_.sum({&count, 1});
-      if (collisions + count >= report.collision_limit) {
-        const EventKey<D> last = key_of_collision(report.collision_limit - collisions);
-        subdomain_.paths().cut(last);
-        got = subdomain_.paths().tally();
-        reached = stop = last.time;
-      }
-    }
+      if (before + count < limit) return;
+      const EventKey<D> last = key_of_contact(limit - before, pairs);
+      subdomain_.paths().cut(last);
+      got = subdomain_.paths().tally();
+      reached = stop = last.time;
+    };
+    end_at(collisions, report.collision_limit, true);
+    end_at(events_, report.contact_limit, false);
     if (report.contacts)
       subdomain_.for_each_contact(
           [&](Slot i, std::size_t k) { contacts.push_back(subdomain_.paths().contact_of(i, k)); });

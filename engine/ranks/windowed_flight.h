@@ -53,7 +53,7 @@ class WindowedFlight {
   void reload();
   template <class Spheres>
   void load(double now, Spheres&& spheres);
-  EventKey<D> key_of_collision(std::uint64_t number);
+  EventKey<D> key_of_contact(std::uint64_t number, bool pairs);
 
   const Box<D>& box_;
   Sizes sizes_;

@@ -371,7 +371,8 @@ Snapshot<D> Monitor<D>::measured(const Waiting& at, const Sums& sums) {
   shot.shadow = shot.total() + plan_.step * plan_.step * at.shadow_term;
   if (!std::isfinite(shot.total()))
     throw Error(Failure::numerical, "the energy is not finite at step " + std::to_string(shot.step) + ", time " +
-                                        short_text(shot.time) + "; " + fastest(system_.particles) +
+                                        short_text(shot.time) + "; " +
+                                        fastest(shot.particles ? *shot.particles : system_.particles) +
                                         "; use a smaller integrator.step");
   return shot;
 }

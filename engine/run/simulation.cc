@@ -19,6 +19,13 @@ constexpr double kLeastInterval = 1e-6;
 /// The longest epoch of a gas that has cooled, in steps: a gas slower than this is at rest to the rounding of
 /// positions.
 constexpr double kLongestEpoch = 1e9;
+/// More kicks of a particle in a step change nothing: that its velocity then stems from a kick has the probability
+/// 1 − e⁻¹⁰⁰.
+constexpr double kMostKicks = 100;
+/// Beyond this number of cells of the length 1/rate, which bath.cc counts, the doubles are farther apart than a cell.
+constexpr double kMostCells = 0x1p52;
+/// After so many oscillations of a shaken wall its phase is known to 10⁻⁶.
+constexpr double kMostOscillations = 1e9;
 /// Flight distance without any pair collision after which a run in an open box ends [longest edge].
 constexpr double kFarApart = 1e4;
 
@@ -46,10 +53,10 @@ void check_spheres(const System<D>& system) {
                                             short_text(overlaps.distance) + "; move them apart");
 }
 
-/// The length of the slab that starts then: to the end of the run, if this is less than a step.
+/// The length of the slab that starts then: to the end of the run, if this is less than a step by more than rounding.
 double length_from(double start, const Plan& plan) {
-  const bool last = plan.end_time && start + plan.step > *plan.end_time - plan.slack();
-  return last ? *plan.end_time - start : plan.step;
+  const double left = plan.end_time.value_or(std::numeric_limits<double>::infinity()) - start;
+  return left < plan.step - plan.end_slack() ? left : plan.step;
 }
 
 void check_interval(double interval, double step) {
@@ -92,6 +99,25 @@ void check_fixed(const System<D>& system, const IntegratorInfo& info) {
                                    "acceleration; take psa, edda or their relatives");
 }
 
+/// Throws if the bath kicks, or a wall oscillates, too often for the slab.
+template <int D>
+void check_rates(const Box<D>& box, const Slab& slab, bool stepping) {
+  const double end = slab.start + slab.length, kicks = box.bath.rate * slab.length;
+  if (box.bath.kicks() && ((stepping && kicks > kMostKicks) || box.bath.rate * end > kMostCells))
+    throw Error(Failure::numerical, "the bath would kick each particle " + short_text(kicks) + " times in " +
+                                        short_text(slab.length) + " units of time" +
+                                        (stepping ? ", and only the last kick matters; take a rate of at most " +
+                                                        short_text(kMostKicks / slab.length)
+                                                  : "; take a smaller rate"));
+  for (const WallOptions<D>& each : box.options)
+    if (each.frequency * end > kMostOscillations)
+      throw Error(Failure::numerical,
+                  box.wall_name(each.number) + " would oscillate " + short_text(each.frequency * end) +
+                      " times until time " + short_text(end) +
+                      ", so often that its phase is lost to rounding; take a frequency of at most " +
+                      short_text(kMostOscillations / end) + ", or end the run earlier");
+}
+
 Plan checked(const Plan& plan) {
   if (!(plan.step > 0)) throw Error(Failure::deck, "the step must be positive");
   if (plan.longest_step != 0 && !(plan.longest_step >= plan.step))
@@ -102,6 +128,16 @@ Plan checked(const Plan& plan) {
   return plan;
 }
 }  // namespace
+
+std::array<double, 2> ramp_times(const Plan& plan, std::int64_t start_step, double start_time) {
+  if (!plan.steps && !plan.end_time)
+    throw Error(Failure::deck,
+                "the temperature of the bath is a ramp over a run without a last time; give run.steps or "
+                "run.end_time, or the ramp_time of the bath, or one temperature");
+  double end = plan.end_time.value_or(std::numeric_limits<double>::infinity());
+  if (plan.steps) end = std::min(end, start_time + static_cast<double>(*plan.steps - start_step) * plan.step);
+  return {start_time, end};
+}
 
 template <int D>
 Simulation<D>::Simulation(std::unique_ptr<System<D>>&& system, const IntegratorInfo& info,
@@ -180,7 +216,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
   }
   if (again) {
     // The last slab was shortened to meet the previous end of the run.
-    if (s.end_time != next_slab().start) {
+    if (std::abs(s.end_time - next_slab().start) > plan_.end_slack()) {
       count_.steps = s.steps;
       count_.time = s.end_time;
       count_.within = count_.boxes = 0;
@@ -278,6 +314,8 @@ void Simulation<D>::run(const Hooks& hooks) {
     monitor_->end_of_slab(report.reached, *integrator_, finished());
     for (auto* observer : observers_) observer->progress(s);
   }
+  // Rows and frames have the time of the step, as in a longer run.
+  if (plan_.end_time && std::abs(s.end_time - *plan_.end_time) <= plan_.end_slack()) s.end_time = *plan_.end_time;
   monitor_->finish();
   system_->decomposition.to_blocks();
   take_time();
@@ -303,6 +341,7 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
       watch.begin();
       system_->box.begin_step(slab.start, info_.stepping ? slab.length : 0);
       if (!system_->box.options.empty()) system_->box.check(Failure::numerical);
+      check_rates(system_->box, slab, info_.stepping);
       if (ContactLaws& laws = system_->box.contacts; !laws.elastic()) {
         laws.thermal_speed = thermal_speed(*system_);
         laws.slow = info_.stepping ? 0 : 1;
@@ -321,8 +360,11 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
       return false;
     } catch (const Error& e) {
       if (e.failure() != Failure::numerical) throw;
-      const std::string what =
-          cramped(2 * slab.length);  // squeezed spheres collide ever faster before there is no room
+      std::string what = cramped(2 * slab.length);  // squeezed spheres collide ever faster before there is no room
+      for (const WallOptions<D>& each : system_->box.options)  // at the ends of oscillations
+        for (const double turns : {0.25, 0.75})
+          if (const double left = turns - each.turns - each.frequency * slab.start; each.amplitude != 0 && what.empty())
+            what = cramped((left - std::floor(left)) / each.frequency);
       throw error(what.empty() ? e.what() : what);
     }
 }
@@ -337,19 +379,14 @@ void Simulation<D>::act_of_bath(const Slab& slab, SlabReport<D>& report) {
   if (bath.kicks() && info_.stepping) kick_all(*system_, slab.start, slab.length, report.counters);
 }
 
-/// Sets the times of a ramp of the bath's temperature, unless an earlier plan has set them.
+/// Sets the times of a ramp of the bath's temperature, unless they are given or an earlier plan has set them.
 template <int D>
 void Simulation<D>::set_ramp() {
   Bath& bath = system_->box.bath;
-  if (bath.type == Bath::Type::none || !bath.has_ramp() || bath.ramp_end > bath.ramp_start) return;
-  if (!plan_.steps && !plan_.end_time)
-    throw Error(Failure::deck,
-                "the temperature of the bath is a ramp over a run without a last time; give run.steps or "
-                "run.end_time, or one temperature");
-  const Statistics& s = statistics_;
-  bath.ramp_start = bath.ramp_end = s.start_time;
-  if (plan_.steps) bath.ramp_end += static_cast<double>(*plan_.steps - s.start_steps) * plan_.step;
-  if (plan_.end_time) bath.ramp_end = plan_.steps ? std::min(bath.ramp_end, *plan_.end_time) : *plan_.end_time;
+  if (!bath.needs_ramp_time()) return;
+  const auto [start, end] = ramp_times(plan_, statistics_.start_steps, statistics_.start_time);
+  bath.ramp_start = start;
+  bath.ramp_end = end;
 }
 
 /// For free flight that ends only after a number of collisions: throws if the spheres have separated for good.
@@ -413,16 +450,18 @@ Slab Simulation<D>::next_slab() const {
   slab.steps = count_.stride;
   if (plan_.steps) slab.steps = std::min(slab.steps, *plan_.steps - slab.index);
   if (plan_.end_time) {
-    const double left = *plan_.end_time - plan_.slack() - time_of(slab.index);
+    const double left = *plan_.end_time - plan_.end_slack() - time_of(slab.index);
     slab.steps = static_cast<std::int64_t>(std::min(static_cast<double>(slab.steps), left / plan_.step));
   }
   slab.steps = std::max<std::int64_t>(slab.steps, 1);
   const double length =
       slab.steps == 1 ? length_from(time_of(slab.index), plan_) : static_cast<double>(slab.steps) * plan_.step;
   slab.length = length - count_.within;
-  if (!info_.stepping)
+  if (!info_.stepping) {
+    slab.contact_limit = 2 * most_collisions_;
     slab.collision_limit = std::min(statistics_.counters.sphere_sphere + most_collisions_,
                                     plan_.collisions.value_or(slab.collision_limit));
+  }
   return slab;
 }
 
@@ -430,7 +469,7 @@ template <int D>
 bool Simulation<D>::finished() const {
   const Statistics& s = statistics_;
   return (plan_.steps && s.steps >= *plan_.steps) ||
-         (plan_.end_time && s.end_time >= *plan_.end_time - plan_.slack()) ||
+         (plan_.end_time && s.end_time >= *plan_.end_time - plan_.end_slack()) ||
          (plan_.collisions && s.counters.sphere_sphere >= *plan_.collisions);
 }
 

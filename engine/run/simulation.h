@@ -38,8 +38,16 @@ struct Plan {
   /// of a step or epoch (engine/run/transient.h); needs a thermo_interval.
   bool from_equilibrium = false;
 
-  double slack() const { return 1e-9 * step; }  ///< tolerance of due times and ends [time]
+  double slack() const { return 1e-9 * step; }  ///< tolerance of due times [time]
+  /// Tolerance of the end time, more than the rounding of a time near it [time].
+  double end_slack() const {
+    return std::max(slack(), 4 * std::numeric_limits<double>::epsilon() * end_time.value_or(0));
+  }
 };
+
+/// The first and last time of a run that starts at this step and time: those of a ramp of the bath's temperature for
+/// which none are given. Throws Error(Failure::deck) if the plan has no last time.
+std::array<double, 2> ramp_times(const Plan& plan, std::int64_t start_step, double start_time);
 
 /// The load on a wall between two thermo rows.
 struct WallLoad {
@@ -234,8 +242,9 @@ class Simulation {
   void run(const std::function<bool()>& should_stop = {}) { run(Hooks{.should_stop = should_stop}); }
 
   /// Ends a slab of free flight after this many collisions, so that checkpoints and stops do not have to wait for the
-  /// end of the epoch. The default is 500 000, which take less than a second, or 4N if this is more: starting a slab
-  /// costs a fifth of a collision per particle, a twentieth of 4N collisions.
+  /// end of the epoch; or after twice as many contacts, with walls and with the bath. The default is 500 000, which
+  /// take less than a second, or 4N if this is more: starting a slab costs a fifth of a collision per particle, a
+  /// twentieth of 4N collisions.
   void limit_slabs(std::uint64_t collisions) { most_collisions_ = collisions; }
   /// Sets another end for the next run(); step and intervals stay as in the first plan.
   void extend(const Plan& end);

@@ -24,7 +24,10 @@ class Compressor {
  public:
   Compressor(const Box<D>& box, std::span<const double> radius, const CompressionOptions& options)
       : box_(box), radius_(radius), options_(options), core_(box_, particles_) {
-    for (WallOptions<D>& each : box_.options) each.velocity = each.amplitude = each.temperature = 0;
+    for (WallOptions<D>& each : box_.options) {
+      each.moved = each.displacement(0);
+      each.velocity = each.amplitude = each.temperature = 0;
+    }
     box_.bath = {};
     const std::size_t n = radius.size();
     particles_.x.resize(n);

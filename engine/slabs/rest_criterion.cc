@@ -87,7 +87,7 @@ double RestCriterion<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& no
 template <int D>
 double RestCriterion<D>::holding_speed(const EventKey<D>& key, const Vec<D>& normal, double force,
                                        double resting) const {
-  if (resting < 0 || !dissipates(key)) return resting;
+  if (resting < 0 || lets_open_ || !dissipates(key)) return resting;
   return std::max(resting, slowest_bounce(key, pressing(key, normal, force)));
 }
 

@@ -51,6 +51,8 @@ class RestCriterion {
   /// For methods that kick: within this time the kick that presses partners together counts as slow [time].
   void stop_within(double time) { kick_ = time; }
   bool kicks() const { return kick_ > 0; }
+  /// For methods that cut the step at each contact: contacts that open more than by rounding are not held.
+  void let_open() { lets_open_ = true; }
 
   /// The sum of the radii, or the radius at a wall.
   double distance(const EventKey<D>& key) const {
@@ -103,6 +105,7 @@ class RestCriterion {
   const std::vector<Reaction<D>>& reactions_;
   const std::vector<Vec<D>>* a_ = nullptr;
   double length_ = 0, kick_ = 0;
+  bool lets_open_ = false;
   std::vector<double> pressed_;  // by particle: Σ |acceleration| over its reactions
   std::vector<Vec<D>> held_;     // by particle: its acceleration by reactions; empty if no contact dissipates
   std::vector<std::pair<EventKey<D>, double>> fallen_back_;  // contacts, and the accelerations that closed them again

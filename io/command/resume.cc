@@ -204,7 +204,7 @@ void go_to_end(Resumed& from, Communicator& ranks) {
 template <int D>
 GivenState state_of(Resumed& from, const Deck& deck) {
   if (from.is_branch()) check_end(deck, from.head);
-  return {from.reader(), from.head.bonds, from.head.time, from.is_branch()};
+  return {from.reader(), from.head.bonds, from.head.time, from.head.step, from.is_branch()};
 }
 
 template <int D>

@@ -105,6 +105,15 @@ Deck read_branch(const Deck& of, std::span<const std::string> overrides, const T
                      "which particles are bonded has been found in the initial state of the run",
                      "give the bonds as 'pairs', or leave 'within' as it is");
   }
+  const auto ramp = [](const Deck& each) {
+    const auto& baths = each.source->baths;
+    return baths.empty() ? nullptr : baths[0].parameters.find<std::vector<double>>("temperature");
+  };
+  const auto sets_ramp_time = [](const std::string& set) { return set.find(".ramp_time=") != std::string::npos; };
+  if (ramp(of) && ramp(deck) && *ramp(of) != *ramp(deck) && std::ranges::none_of(overrides, sets_ramp_time))
+    problems.error({"--set bath.0.temperature"},
+                   "this ramp would get the ramp_time of the run, whose ramp was another one",
+                   "set bath.0.ramp_time, too: [start, end] in the time of the run");
   problems.throw_errors(Failure::deck);
   const auto rough = [](const Deck& each) {
     return std::ranges::any_of(each.source->values.list("contact"),

@@ -87,8 +87,9 @@ std::size_t particle_count(const Deck& deck);
 struct GivenState {
   StateReader read;  ///< called on rank 0
   std::vector<PairList>
-      bonds;        ///< for each interaction that finds its bonds in the initial state, in the order of the deck
-  double time = 0;  ///< time of the state
+      bonds;               ///< for each interaction that finds its bonds in the initial state, in the order of the deck
+  double time = 0;         ///< time of the state
+  std::int64_t steps = 0;  ///< and its number of steps
   bool branch =
       false;  ///< the state belongs to another deck: this deck's defaults are completed, and the state is checked
 };

@@ -97,7 +97,7 @@ void give_motion(const Deck::Source& source, System<D>& system) {
 /// Writes the values that depend on the initial state into the deck. Reports parameters of [output] that are not valid
 /// in this box.
 template <int D>
-void complete_values(Deck& deck, const System<D>& system, Problems& problems) {
+void complete_values(Deck& deck, System<D>& system, const GivenState* given, Problems& problems) {
   Deck::Source& source = *deck.source;
   if (source.edges.empty()) {
     source.edges.assign(system.box.edges.begin(), system.box.edges.end());
@@ -114,6 +114,10 @@ void complete_values(Deck& deck, const System<D>& system, Problems& problems) {
     deck.plan.step = deck.integrator_parameters.real("step");
     for (const char* const name : {"step", "lengthen"})
       source.values.find("integrator")->values.set(name, deck.integrator_parameters.all().find(name)->second);
+  }
+  if (Bath& bath = system.box.bath; bath.needs_ramp_time()) {
+    const auto [start, end] = ramp_times(deck.plan, given ? given->steps : 0, given ? given->time : 0);
+    source.values.find("bath")->values.set("ramp_time", std::vector{bath.ramp_start = start, bath.ramp_end = end});
   }
   ValueTable& output = *source.values.find("output");
   for (auto& [info, parameters] : deck.output.observables) {
@@ -245,7 +249,7 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const G
   make_interactions(source, *system, true, problems);
   problems.throw_errors(Failure::deck);
   if (given && !given->branch) return system;
-  complete_values(deck, *system, problems);
+  complete_values(deck, *system, given, problems);
   problems.throw_errors(Failure::deck);
   check_state(deck, *system, problems, given == nullptr);
   problems.throw_errors(Failure::initial_state);

@@ -86,7 +86,8 @@ class Interpreter {
       for (TableConfig& wall : source_.walls)
         if (!wall.wrong) wall.wrong = report(wall.at, [&] { add_wall(box, wall.parameters); });
       for (TableConfig& contact : source_.contacts)
-        if (!contact.wrong) contact.wrong = report(contact.at, [&] { add_contact(box, names, contact.parameters); });
+        if (!contact.wrong && !names.empty())
+          contact.wrong = report(contact.at, [&] { add_contact(box, names, contact.parameters); });
       if (source_.edges.size() != dimension_ || source_.walls.empty()) return;
       std::copy_n(source_.edges.begin(), dimension_, box.edges.begin());
       report(source_.walls.back().at, [&] { box.check(Failure::deck); });
@@ -413,6 +414,7 @@ class Interpreter {
 
   void ids_exist(const ValueTable& table) {
     const std::size_t n = source_.particles();
+    if (n == 0 || std::ranges::count(source_.species, 0u, &SpeciesConfig::count) > 0) return;  // an error of its own
     table.each_key([&](const Parameter& key) {
       const auto* pairs = table.find<PairList>(key.name);
       if (pairs == nullptr) return;
@@ -464,11 +466,13 @@ class Interpreter {
     table->read<std::int64_t>("collisions", deck_.plan.collisions);
     if (!table->given("steps") && !table->given("end_time") && !table->given("collisions"))
       problems_.error(table->at, "[run] has no end", "give steps, end_time or collisions");
-    const auto ramp = [](const TableConfig& bath) { return bath.parameters.find<std::vector<double>>("temperature"); };
+    const auto ramp = [](const TableConfig& bath) {
+      return bath.parameters.find<std::vector<double>>("temperature") && !bath.parameters.has("ramp_time");
+    };
     if (const auto at = std::ranges::find_if(source_.baths, ramp);
         at != source_.baths.end() && table->given("collisions") && !table->given("steps") && !table->given("end_time"))
       problems_.error(at->at, "the temperature is a ramp over a run without a last time",
-                      "give run.steps or run.end_time, or one temperature");
+                      "give run.steps or run.end_time, or the ramp_time of the bath, or one temperature");
     if (source_.integrator != nullptr && !source_.integrator->hard_cores && table->given("collisions") &&
         !table->given("steps") && !table->given("end_time"))
       problems_.error(table->place("collisions"),

@@ -87,25 +87,27 @@ void write_parameters(File& file, const Deck& deck, const System<D>& system) {
   file.write_texts(group, "species", system.species);
 }
 
-/// The walls that are more than fixed faces of the box; `motion`: normal·x at the start, and how it changes, of each.
+/// The walls that are more than fixed faces of the box; `motion` of each: normal·x without motion, velocity, amplitude,
+/// frequency and phase of a sine.
 template <int D>
 void write_walls(File& file, const Box<D>& box) {
   if (box.options.empty()) return;
   std::vector<std::string> names;
   std::vector<Vec<D>> normals;
   std::vector<double> motion;
+  Box<D> still = box;
+  for (WallOptions<D>& each : still.options) each.velocity = each.amplitude = 0;
   for (const WallOptions<D>& each : box.options) {
-    const Wall<D> wall = box.wall(each.number);
+    const Wall<D> wall = still.wall(each.number);
     names.push_back(each.name);
     normals.push_back(wall.normal);
-    motion.insert(motion.end(), {wall.offset - (each.displacement(box.time) - each.moved), each.velocity,
-                                 each.amplitude, each.frequency});
+    motion.insert(motion.end(), {wall.offset, each.velocity, each.amplitude, each.frequency, each.turns});
   }
   const Handle group = file.group("parameters/walls");
   file.write_texts(group, "name", names);
   file.write_array(group, "normal", hdf5::native_type<double>(), three_columns<double>(normals, D).data(),
                    {names.size(), 3});
-  file.write_array(group, "motion", hdf5::native_type<double>(), motion.data(), {names.size(), 4});
+  file.write_array(group, "motion", hdf5::native_type<double>(), motion.data(), {names.size(), 5});
 }
 
 /// The radius of a species: the mean of its particles, exact if all have the same radius.

@@ -46,7 +46,8 @@ ARGUMENTS = {"box": "npt.ArrayLike", "boundary": "Boundary | Sequence[Boundary]"
              "seed": "int", "parameters": "Any", "thermo_interval": "float", "keys": "Any", "port": "int", "browser": "bool",
              "expression": "str | Callable[..., Any]", "start": "float", "cutoff": "float", "tolerance": "float",
              "options": "Mapping[str, Any]", "constants": "Any", "name": "str", "normal": "npt.ArrayLike",
-             "atom_style": "str", "one": "str", "other": "str", "rate": "float", "spin": "npt.ArrayLike", "inertia": "float"}
+             "atom_style": "str", "one": "str", "other": "str", "rate": "float", "spin": "npt.ArrayLike", "inertia": "float",
+             "ramp_time": "Sequence[float]"}
 RESULTS = {"__init__": "None", "from_deck": "Simulation", "from_run": "Simulation", "from_file": "Simulation",
            "add_particles": "range", "add_wall": "None", "add_contact": "None", "add_bath": "None", "place": "range", "thermalize": "None",
            "add_potential": "Sampled", "output": "None",

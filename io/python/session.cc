@@ -210,14 +210,50 @@ void Session<D>::set(std::vector<T> Particles<D>::*member, std::span<const doubl
 }
 
 template <int D>
+std::vector<Parameters> Session<D>::walls() const {
+  std::vector<Parameters> all = walls_;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    WallOptions<D> now = box_.options[k];
+    now.restart(present());
+    all[k].set("moved", now.moved);
+    all[k].set("phase", now.turns);
+  }
+  return all;
+}
+
+template <int D>
 void Session<D>::add_wall(Parameters given) {
-  Parameters complete = completed("wall", wall_parameters(), std::move(given));
+  if (running_) refuse("a run is going on; change walls before it or after it");
+  std::vector<Parameters> all = walls();
+  const auto* name = given.find<std::string>("name");
+  const auto old =
+      std::ranges::find_if(all, [&](const Parameters& each) { return name && each.text("name") == *name; });
+  if (old == all.end()) {
+    all.push_back(completed("wall", wall_parameters(), std::move(given)));
+  } else {
+    for (const char* const fixed : {"normal", "offset"})
+      if (given.has(fixed))
+        refuse("the wall '" + *name + "' is there already and stays where it is; leave '" + fixed +
+               "' out, or give 'moved'");
+    const bool stays = given.has("velocity") && !given.has("moved");
+    Parameters changed = *old;
+    if (stays) changed.set("phase", 0.0), changed.set("moved", 0.0);
+    for (const auto& [key, value] : given.all()) changed.set(key, value);
+    *old = completed("wall", wall_parameters(), std::move(changed));
+    if (stays) {
+      Box<D> box = box_;
+      box.options.clear();
+      carom::add_wall(box, *old);
+      old->set("moved", box_.options[old - all.begin()].displacement(present()) - box.options[0].displacement(0));
+    }
+  }
   Box<D> box = box_;
   box.restart();
-  carom::add_wall(box, complete);
+  box.options.clear();
+  for (const Parameters& each : all) carom::add_wall(box, each);
   change("add walls");
   system_->box = box_ = box;
-  walls_.push_back(std::move(complete));
+  walls_ = std::move(all);
   set_contacts(contacts_);
 }
 
@@ -235,7 +271,7 @@ void Session<D>::add_contact(Parameters given) {
 /// To be called before a change that lets the run go on: the state from which it continues must be the present one.
 template <int D>
 void Session<D>::need_state_at_end(const char* what) const {
-  if (shown_until_ < 0 || state_time_ == statistics_.end_time) return;
+  if (shown_until_ < 0 || std::abs(state_time_ - statistics_.end_time) <= 1e-9 * step_) return;
   refuse(
       std::string(what) + ": the last run ended at time " + short_text(statistics_.end_time) +
       ", within a step or an epoch of free flight; end runs at whole steps, for example by integrator(\"free-flight\", "
@@ -351,6 +387,7 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
     };
   const auto end = [&] {
     statistics_ = *std::exchange(live_, nullptr);
+    if (shot_ && std::abs(shot_->time - statistics_.end_time) <= 1e-9 * step_) shot_->time = statistics_.end_time;
     shown_until_ = std::max(shown_until_, statistics_.end_time);
     averages_ = averages();
     record_ = nullptr;

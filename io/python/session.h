@@ -65,7 +65,7 @@ class Session {
   std::vector<Vec<D>> drawn_velocities(std::span<const double> temperature, std::uint64_t seed);
   /// The same for spins and rotational temperatures.
   std::vector<Spin<D>> drawn_spins(std::span<const double> temperature, std::uint64_t seed);
-  /// Adds a wall or changes a face of the box.
+  /// Adds a wall or changes one, which stays where it is.
   void add_wall(Parameters given);
   /// Sets the bath, in place of an earlier one.
   void set_bath(Parameters given);
@@ -110,13 +110,14 @@ class Session {
   const IntegratorInfo* integrator() const { return integrator_; }
   const Parameters& integrator_parameters() const { return parameters_; }
   const std::vector<Force>& forces() const { return terms_.all(); }
-  const std::vector<Parameters>& walls() const { return walls_; }
+  /// With the places of moving walls, and the phases of shaken ones, at the time of the present state.
+  std::vector<Parameters> walls() const;
   const std::vector<Parameters>& contacts() const { return contacts_; }
   /// By name: the pressure on each face of the box that is a wall, and the force on each further wall, since the last
   /// row.
   std::map<std::string, double> wall_loads();
-  /// None, or one.
-  const std::vector<Parameters>& baths() const { return baths_; }
+  /// None, or one. A ramp that has begun has its ramp_time.
+  std::vector<Parameters> baths() const;
   /// During a run: only in RunHooks::show.
   Averages averages() const;
   /// Warnings of the last run; without files only of overlaps.
@@ -130,6 +131,7 @@ class Session {
   class Shown;
   void change(const char* what);
   void need_state_at_end(const char* what) const;
+  double present() const { return showing_ ? shot_->time : statistics().end_time; }
   void set_contacts(std::vector<Parameters> all);
   template <class T>
   void set(std::vector<T> Particles<D>::*member, std::span<const double> values, const char* what);

@@ -112,7 +112,7 @@ void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
     deck_ = std::move(deck);
   } else {
     set_tables(*deck_, "contact", contacts_);  // laws and the bath may have changed since the last run
-    set_tables(*deck_, "bath", baths_);
+    set_tables(*deck_, "bath", baths());
     set_ends(*deck_, plan);
   }
   const Plan& of = deck_->plan;
@@ -180,6 +180,14 @@ void Session<D>::set_bath(Parameters given) {
 }
 
 template <int D>
+std::vector<Parameters> Session<D>::baths() const {
+  std::vector<Parameters> all = baths_;
+  if (const Bath& bath = (at_work_ ? at_work_->box : box_).bath; bath.has_ramp() && !bath.needs_ramp_time())
+    all[0].set("ramp_time", std::vector{bath.ramp_start, bath.ramp_end});
+  return all;
+}
+
+template <int D>
 void Session<D>::set_bath_temperature(double temperature) {
   if (baths_.empty()) refuse("there is no bath; call add_bath() first");
   if (running_ && !(showing_ && std::this_thread::get_id() == runner_))
@@ -187,6 +195,7 @@ void Session<D>::set_bath_temperature(double temperature) {
   if (!running_) need_state_at_end("the temperature of the bath");
   Parameters given = baths_[0];
   given.set("temperature", temperature);
+  given.erase("ramp_time");
   baths_[0] = completed("bath", bath_parameters(), std::move(given));
   box_.bath.set_temperature(temperature);
   (at_work_ ? at_work_->box : system_->box).bath.set_temperature(temperature);

@@ -90,10 +90,11 @@ Json walls_of(const hdf5::File& file) {
   const auto names = hdf5::texts(file, "/parameters/walls/name");
   const auto normal = hdf5::numbers<double>(file, "/parameters/walls/normal"),
              motion = hdf5::numbers<double>(file, "/parameters/walls/motion");
+  const std::size_t columns = names.empty() ? 0 : motion.size() / names.size();  // 4 in files of earlier versions
   for (std::size_t n = 0; n < names.size(); ++n)
     walls.push_back({{"name", names[n]},
                      {"normal", std::vector<double>(&normal.at(3 * n), &normal.at(3 * n) + 3)},
-                     {"motion", std::vector<double>(&motion.at(4 * n), &motion.at(4 * n) + 4)}});
+                     {"motion", std::vector<double>(&motion.at(columns * n), &motion.at(columns * n) + columns)}});
   return walls;
 }
 

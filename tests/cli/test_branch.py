@@ -222,3 +222,15 @@ def test_places(half, tmp_path):
     assert done.returncode == 2 and "--output is required" in done.stderr
     assert contents(half) == kept and not (tmp_path / "out").exists()
     assert subprocess.run(["mpirun", "-n", "2", CAROM, "branch", "--help"], env=mpi_environment(), capture_output=True).returncode == 0
+
+
+def test_a_ramp_goes_on_in_a_branch_and_another_ramp_needs_its_times(tmp_path):
+    deck = write_deck(tmp_path, box("psa", 2, 50) + '[[bath]]\ntype = "andersen"\ntemperature = [1.0, 2.0]\nrate = 5.0\n')
+    run(deck, tmp_path / "run", ["run.steps=20", "bath.0.ramp_time=[0.0, 1.0]"])
+    branch(tmp_path / "run", tmp_path / "same", ["run.steps=50"])
+    go_on(tmp_path / "run", ["--set", "run.steps=50"])
+    assert thermo(tmp_path / "same")["temperature"][-1] == thermo(tmp_path / "run")["temperature"][-1]
+    refused = branch(tmp_path / "run", tmp_path / "other", ["bath.0.temperature=[2.0, 3.0]", "run.steps=90"], code=2)
+    assert "set bath.0.ramp_time, too" in refused.stderr
+    branch(tmp_path / "run", tmp_path / "other", ["bath.0.temperature=[2.0, 3.0]", "bath.0.ramp_time=[1.0, 1.8]", "run.steps=90"])
+    branch(tmp_path / "run", tmp_path / "constant", ["bath.0.temperature=2.0", "run.steps=60"])

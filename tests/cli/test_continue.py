@@ -306,3 +306,13 @@ def test_mistakes(tmp_path):
     assert "there is no checkpoint.h5 to go on from" in go_on(tmp_path, code=5).stderr
     assert "there is no checkpoint.h5 to go on from" in go_on(tmp_path / "missing", code=5).stderr
     assert not (tmp_path / "missing").exists() and not list(tmp_path.iterdir())
+
+
+def test_a_ramp_keeps_its_end_in_a_longer_run(tmp_path):
+    """A bath that heats from 1 to 2 over the run; the run is continued to twice its end, where the temperature stays 2."""
+    deck = write_deck(tmp_path, box("edda", 2, 100) + '[[bath]]\ntype = "andersen"\ntemperature = [1.0, 2.0]\nrate = 5.0\n')
+    run(deck, tmp_path / "longer", ["run.steps=50"])
+    assert "ramp_time = [0.0, 1.0]" in (tmp_path / "longer" / "deck.toml").read_text()
+    go_on(tmp_path / "longer", ["--set", "run.steps=100"])
+    run(deck, tmp_path / "whole", ["bath.0.ramp_time=[0.0, 1.0]"])
+    expect_same(tmp_path / "whole", tmp_path / "longer")

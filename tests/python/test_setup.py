@@ -143,6 +143,12 @@ def test_an_expression_keeps_its_energy():
 @pytest.mark.parametrize("expression, given, message", [
     ("epsilon*r", {}, "unknown name 'epsilon' in 'epsilon\\*r'"), ("r.__class__", {}, "unknown name '__class__'"),
     ("r +", {}, "is no expression"), ("log(r - 1)", {}, "not finite at r = 0.5"), (3, {}, "give a text such as"),
+    ("r*1j", {}, "'r\\*1j' gives complex numbers; V must be real"),
+    ("1/0", {}, "'1/0' does not depend on r"), ("1/(r - r)", {}, "not finite"), ("r > 1", {}, "gives truth values"),
+    (lambda: 1, {}, "cannot be computed: TypeError: .* takes 0 positional arguments"), (lambda r: 1, {}, "V is 1 at every r, so there"),
+    (lambda r: [1, 2], {}, "it must give V for an array r"), ("sigma/r", {"sigma": "x"}, "'sigma' is 'x'; give a number"),
+    ("exp(r, r, r)", {}, "cannot be computed: TypeError"), ("1/r", {"start": "a"}, "start is 'a'; give a number"),
+    ("1/r", {"cutoff": np.inf}, "give 0 < start < cutoff"),
     ("abs(r - 1.234)", {"tolerance": 1e-9}, "8192 points leave an error of"), ("r", {"start": 0}, "give 0 < start < cutoff"),
 ])
 def test_mistakes_in_expressions(expression, given, message):

@@ -246,6 +246,107 @@ def test_walls_move_and_stay_where_they_are_in_the_next_run():
         sim.add_wall("x-", normal=[1, 0])
 
 
+def in_moving_walls():
+    """Two discs under a field between a shaken floor and a moving ramp."""
+    sim = carom.Simulation(box=[10, 10], boundary="wall")
+    sim.add_particles([[5, 5], [4, 3]], velocity=[[-1, 0.3], [0.5, 0.2]], radius=0.5)
+    sim.add_wall("y-", velocity={"amplitude": 0.1, "frequency": 0.3})
+    sim.add_wall("ramp", normal=[1, 1], offset=1, velocity=0.05)
+    sim.add_force("uniform-field", acceleration=[0, -0.5])
+    return sim
+
+
+@pytest.mark.parametrize("method", ["free-flight", "edda"])
+def test_a_deck_of_the_present_state_has_walls_and_ramps_as_they_are(method, tmp_path):
+    sim = in_moving_walls()
+    sim.integrator(method, step=0.01)
+    sim.run(time=2.3)
+    assert sim.walls[0]["phase"] == pytest.approx(0.69) and sim.walls[1]["moved"] == pytest.approx(0.115)
+    sim.write_deck(tmp_path / "deck.toml", time=3)
+    from_deck = carom.Simulation.from_deck(tmp_path / "deck.toml")
+    from_deck.run()
+    sim.run(time=5.3)
+    assert np.abs(from_deck.position - sim.position).max() < 1e-9
+    # A new run of the same simulation goes on likewise, in the time since its start.
+    again = in_moving_walls()
+    again.integrator(method, step=0.01)
+    again.run(time=2.3)
+    again.velocity = again.velocity.copy()
+    again.run(time=3)
+    assert np.abs(again.position - sim.position).max() < 1e-9
+    heated = gas(step=1.0)
+    heated.add_bath("andersen", temperature=[1.0, 5.0], rate=1.0, ramp_time=[1, 5])
+    heated.run(time=2)
+    heated.write_deck(tmp_path / "deck.toml", time=3)
+    assert carom.Simulation.from_deck(tmp_path / "deck.toml").bath["ramp_time"] == [-1, 3]
+
+
+def test_a_moved_wall_can_be_stopped():
+    sim = carom.Simulation(box=[10, 6])
+    sim.add_particles([[2, 3], [5, 3]], velocity=[[1, 0.2], [0, -0.1]], radius=0.5)
+    sim.add_wall("x+", velocity=0.25)
+    sim.add_wall("y-", velocity={"amplitude": 0.2, "frequency": 0.1})
+    sim.integrator("free-flight", step=1.0)
+    sim.run(time=8)
+    floor = 0.2 * np.sin(2 * np.pi * 0.8)
+    for velocity in (0, {"amplitude": 0.1, "frequency": 1.0}):
+        sim.add_wall("x+", velocity=0)
+        sim.add_wall("y-", velocity=velocity)
+        assert sim.walls[0]["moved"] == 2 and sim.walls[1]["moved"] == pytest.approx(floor)
+        assert sim.time == 0
+        before = sim.energy
+        sim.run(time=40)
+        assert sim.position[:, 0].max() <= 7.5 + 1e-9 and (velocity != 0 or sim.energy == pytest.approx(before, rel=1e-12))
+        floor += 0.1 * np.sin(2 * np.pi * 40) if velocity else 0
+    with pytest.raises(carom.UsageError, match="the wall 'x\\+' is there already and stays where it is; leave 'offset' out, or give 'moved'"):
+        sim.add_wall("x+", offset=1.0)
+
+
+@pytest.mark.parametrize("step", [0.01, 0.1, 0.07, 0.3])
+def test_a_run_to_a_multiple_of_the_step_ends_at_a_whole_step(step):
+    """However 10 steps of this length are rounded, the run goes on from its end."""
+    time = round(10 * step, 2)
+    sims = [five_springs(), five_springs()]
+    for sim in sims:
+        sim.integrator("edda", step=step)
+        sim.add_bath("andersen", temperature=1.0, rate=1.0)
+    for end in (time, 2 * time):
+        sims[0].run(time=end)
+    sims[1].run(time=2 * time)
+    assert (sims[0].position == sims[1].position).all()
+    sims[0].add_contact("*", "*", restitution=0.9)
+    sims[0].bath_temperature = 2.0
+    sims[0].run(time=3 * time)
+    assert sims[0].energy_error < 1e-12
+    sims[0].run(time=3 * time + 0.4 * step)
+    with pytest.raises(carom.UsageError, match="within a step"):
+        sims[0].bath_temperature = 1.0
+
+
+def test_a_ramp_has_its_own_times():
+    def heated(ends, **ramp):
+        sim = gas(step=0.5)
+        sim.add_bath("andersen", temperature=[1.0, 4.0], rate=5.0, **ramp)
+        for end in ends:
+            sim.run(time=end)
+        return sim
+
+    whole = heated([4])
+    assert whole.bath["ramp_time"] == [0, 4]
+    assert (heated([2, 4], ramp_time=[0, 4]).position == whole.position).all()
+    first = heated([2, 4])  # over the first run
+    assert first.bath["ramp_time"] == [0, 2] and (first.position == heated([4], ramp_time=[0, 2]).position).all()
+    first.bath_temperature = 2.0
+    assert "ramp_time" not in first.bath
+    with pytest.raises(carom.UsageError, match="ramp_time of the bath is not two times, one after the other"):
+        heated([1], ramp_time=[2, 1])
+    placed = carom.Simulation(box=[9, 9, 9])
+    placed.add_bath("andersen", temperature=[1.0, 4.0], rate=5.0)
+    placed.add_particles(count=8, temperature=1.0, radius=0.5)
+    placed.place("random")
+    assert placed.bath["temperature"] == [1, 4]
+
+
 def test_a_bath_changes_its_temperature_between_runs():
     def heated(first, second):
         sim = gas(step=1.0)

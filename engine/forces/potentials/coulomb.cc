@@ -59,7 +59,7 @@ InteractionInfo coulomb() {
            {"accuracy", Type::real, "none", "-",
             "of the form ewald: root mean square error of the forces, relative to C q^2/a^2, q^2 the mean squared "
             "charge "
-            "and a^3 the volume per charge; from 1e-14 to 0.1; absent: 1e-5",
+            "and a^3 the volume per charge; from 1e-12 to 0.1; absent: 1e-5",
             Range::positive},
            {"surface",
             Type::text,

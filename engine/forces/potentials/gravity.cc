@@ -43,7 +43,7 @@ InteractionInfo gravity() {
             {"plain", "ewald"}},
            {"accuracy", Type::real, "none", "-",
             "of the form ewald: root mean square error of the forces, relative to G m^2/a^2, m^2 "
-            "the mean squared mass and a^3 the volume per particle; from 1e-14 to 0.1; absent: 1e-5",
+            "the mean squared mass and a^3 the volume per particle; from 1e-12 to 0.1; absent: 1e-5",
             Range::positive}}),
       .formula = "sum over pairs of -G m m'/r, or the Ewald sum over all pairs and images",
       .documentation =

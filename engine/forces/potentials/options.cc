@@ -25,6 +25,7 @@ std::vector<Parameter> with_cut(std::vector<Parameter> own, std::string_view abs
   using enum Parameter::Type;
   own = with_filter(std::move(own));
   own.push_back({"cutoff", real, "none", "length", std::string(absent_cutoff), Parameter::Range::positive});
+  own.back().most = 1e100;  // its square is a number
   own.push_back(
       {"cut",
        text,

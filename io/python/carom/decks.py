@@ -61,7 +61,8 @@ def system_of(sim):
 
 def surroundings_of(sim):
     """The tables [[wall]], [[bath]] and [[contact]] of a deck."""
-    tables = {"wall": sim.walls, "bath": sim._session.baths, "contact": sim.contacts}
+    baths = [one | {"ramp_time": [time - sim.time for time in one["ramp_time"]]} if "ramp_time" in one else one for one in sim._session.baths]
+    tables = {"wall": sim.walls, "bath": baths, "contact": sim.contacts}
     return {name: given for name, given in tables.items() if given}
 
 

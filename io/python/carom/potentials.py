@@ -2,6 +2,7 @@
 """Samples pair potentials that are given as expressions, so that the error of the resulting table is known."""
 
 import math
+import numbers
 
 import numpy as np
 
@@ -29,24 +30,38 @@ class Sampled:
 def function_of(expression, constants):
     """A function V(r) that accepts arrays, from an expression of r and constants or from a function of r."""
     if callable(expression):
-        return lambda r: np.broadcast_to(np.asarray(expression(r, **constants), dtype=float), np.shape(r))
+        return lambda r: _values("the function", r, lambda: expression(r, **constants))
     if not isinstance(expression, str):
         raise UsageError(f"potential: the expression is {expression!r}; give a text such as '4*(r**-12 - r**-6)', or a function of r")
     try:
         code = compile(expression, "potential", "eval")
-    except SyntaxError as error:
-        raise UsageError(f"potential: '{expression}' is no expression: {error.msg}") from error
+    except (SyntaxError, ValueError) as error:
+        raise UsageError(f"potential: '{expression}' is no expression: {error}; give a text such as '4*(r**-12 - r**-6)'") from error
     names = set(code.co_names)
     unknown = names - set(FUNCTIONS) - set(constants) - {"r"}
     if unknown:
         raise UsageError(f"potential: unknown name '{min(unknown)}' in '{expression}'; give it as a keyword, or use r and "
                          f"{', '.join(FUNCTIONS)}")
+    if "r" not in names:
+        raise UsageError(f"potential: '{expression}' does not depend on r; give an expression of r, the distance")
+    for name, number in constants.items():
+        if not isinstance(number, numbers.Real):
+            raise UsageError(f"potential: '{name}' is {number!r}; give a number")
     known = {"__builtins__": {}} | FUNCTIONS | constants
+    return lambda r: _values(f"'{expression}'", r, lambda: eval(code, known | {"r": r}))
 
-    def value(r):
+
+def _values(what, r, evaluate):
+    """V at the distances r, from `evaluate`, which belongs to the user."""
+    try:
         with np.errstate(all="ignore"):
-            return np.broadcast_to(np.asarray(eval(code, known | {"r": r}), dtype=float), np.shape(r))
-    return value
+            found = np.broadcast_to(np.asarray(evaluate()), np.shape(r))
+    except Exception as error:
+        raise UsageError(f"potential: {what} cannot be computed: {type(error).__name__}: {error}; it must give V for an array r") from error
+    if found.dtype.kind not in "iuf":
+        kind = {"c": "complex numbers", "b": "truth values"}.get(found.dtype.kind, f"values of type {found.dtype}")
+        raise UsageError(f"potential: {what} gives {kind}; V must be real numbers")
+    return found.astype(float)
 
 
 def derivative(value, r):
@@ -67,7 +82,10 @@ def sample(expression, start, cutoff, tolerance=1e-8, **constants):
     """
     from carom import _carom
 
-    if not 0 < start < cutoff:
+    for name, number in (("start", start), ("cutoff", cutoff), ("tolerance", tolerance)):
+        if not isinstance(number, numbers.Real):
+            raise UsageError(f"potential: {name} is {number!r}; give a number")
+    if not 0 < start < cutoff < math.inf:
         raise UsageError(f"potential: start is {start} and cutoff {cutoff}; give 0 < start < cutoff")
     value = function_of(expression, constants)
     points = 16
@@ -78,6 +96,8 @@ def sample(expression, start, cutoff, tolerance=1e-8, **constants):
         if not np.all(np.isfinite(exact)):
             wrong = at[~np.isfinite(exact)][0]
             raise UsageError(f"potential: V is not finite at r = {wrong:.6g}; give a larger start, or another expression")
+        if points == 16 and exact[0] != 0 and np.all(exact == exact[0]):
+            raise UsageError(f"potential: V is {exact[0]:g} at every r, so there would be no force; give an expression of r, the distance")
         ends = derivative(value, np.array([start, cutoff]))
         slope = ends if np.all(np.isfinite(ends)) else np.empty(0)
         found, found_slope = _carom.spline(r, value(r), slope, at)

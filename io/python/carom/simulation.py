@@ -233,6 +233,7 @@ class Simulation:
         if old.method == "verlet":
             deck |= {"integrator": {"type": "verlet", "step": 1.0}, "run": {"steps": 1},
                      "particles": [{"display_radius" if key == "radius" else key: one[key] for key in one} for one in deck["particles"]]}
+        deck.pop("bath", None)  # it has no part in the placement
         if packing_fraction is not None:
             deck["placement"]["packing_fraction"] = packing_fraction
         session, texts, _ = _carom.from_deck("place", [], toml_text(deck))
@@ -247,6 +248,8 @@ class Simulation:
             session.set_spin(session.drawn_spins(spinning, seed))
         for name, given in old.forces:
             session.add_force(name, given)
+        for given in old.baths:
+            session.set_bath(given)
         if old.method:
             session.set_integrator(old.method, old.method_parameters)
         if self._output:
@@ -278,8 +281,10 @@ class Simulation:
 
         normal: the normal of a further wall, which points to the side of the spheres. Other parameters are those of [[wall]] in decks: offset,
         velocity (a number along the normal, or {"amplitude": …, "frequency": …}), one_sided, …; see carom.describe("wall").
+        A later call for the same wall changes what it gives, and the wall stays where it is; its sine starts anew with a new velocity.
 
             sim.add_wall("x+", velocity=0.05)                         # a piston
+            sim.add_wall("x+", velocity=0)                            # after a run: stops it
             sim.add_wall("ramp", normal=[1, 2], offset=3.0)           # normal·x = offset
         """
         given = refuse_masked("add_wall", parameters | {"name": name_of("add_wall", name)})
@@ -299,19 +304,20 @@ class Simulation:
         given = refuse_masked("add_contact", dict(parameters))
         self._session.add_contact(given | {"between": [name_of("add_contact", one), name_of("add_contact", other)]})
 
-    def add_bath(self, type, temperature, rate, seed=1):
+    def add_bath(self, type, temperature, rate, seed=1, ramp_time=None):
         """Couples all particles to a heat bath, in place of an earlier one.
 
         type: "andersen": at random times a particle gets a new velocity from the distribution of Maxwell and Boltzmann;
         "rescaling": all velocities are scaled by a common random factor, so that the kinetic energy is canonical.
-        temperature: a number [energy], or [first, last] for a linear ramp over the next run. rate: kicks of a particle per
-        unit time; for rescaling, 1/relaxation time.
+        temperature: a number [energy], or [first, last] for a linear ramp. ramp_time: [start, end] of the ramp, before and after which
+        the temperature is constant [time]; by default those of the next run(), so that later runs keep the last temperature.
+        rate: kicks of a particle per unit time; for rescaling, 1/relaxation time.
 
             sim.add_bath("andersen", temperature=1.0, rate=0.5)
             sim.run(time=100)
             sim.bath_temperature = 2.0       # the next run() continues the run
         """
-        given = {"type": type, "temperature": temperature, "rate": rate, "seed": seed}
+        given = {"type": type, "temperature": temperature, "rate": rate, "seed": seed, "ramp_time": ramp_time}
         self._session.set_bath(refuse_masked("add_bath", given))
 
     def _set_bath_temperature(self, value):
@@ -394,7 +400,8 @@ class Simulation:
 
     def run(self, time=None, steps=None, collisions=None, every=None, callback=None, progress=None):
         """Runs to a time, a number of steps or a number of pair collisions, all counted from the start of the run. A later call with a
-        later end continues the run, with the bits of one undisturbed run. Without any end: runs to the end of the deck.
+        later end continues the run, with the bits of one undisturbed run; a bath's ramp keeps its end. Without any end: runs to the end
+        of the deck.
 
         time [time], steps, collisions: the run ends at the first of them that it reaches.
         callback(simulation) is called at intervals of `every` units of simulated time, and at the start and the end; it may set
@@ -479,7 +486,8 @@ class Simulation:
                     doc="The heat bath, as a dictionary of its options; None: there is none.")
     bath_temperature = property(lambda self: self.bath and self.bath["temperature"], _set_bath_temperature,
                                 doc="The temperature of the bath [energy]. If it is set between two runs, the second one continues the first.")
-    walls = property(lambda self: self._session.walls, doc="The walls that were added, as dictionaries of their options.")
+    walls = property(lambda self: self._session.walls,
+                     doc="The walls that were added, as dictionaries of their options; `moved` and `phase` are those of the present time.")
     wall_loads = property(lambda self: self._session.wall_loads,
                           doc="By wall: the pressure on a face of the box [energy/length^D], the force on a further wall, since "
                               "the last row or callback; between runs those of the last one.")

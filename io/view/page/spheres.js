@@ -185,8 +185,8 @@ function wallsOf(edges, boundary, flat) {
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 // Where a wall is at a time: normal·x = level.
-function planeOf({ normal, motion: [offset, velocity, amplitude, frequency] }, time) {
-  return { normal, level: offset + velocity * time + amplitude * Math.sin(2 * Math.PI * frequency * time) };
+function planeOf({ normal, motion: [offset, velocity, amplitude, frequency, phase = 0] }, time) {
+  return { normal, level: offset + velocity * time + amplitude * Math.sin(2 * Math.PI * (frequency * time + phase)) };
 }
 // The part of a plane that is in the box, as triangles; in two dimensions a band behind it.
 function partOf({ normal, level }, edges, flat) {

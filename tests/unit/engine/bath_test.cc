@@ -265,6 +265,20 @@ TEST(Baths, MistakesAreRefused) {
               start("mcva", {.step = 0.01, .steps = 3}, {{"variant", std::string("restart")}}, 1);
             }).find("knows no baths"),
             std::string::npos);
+  const auto rate = [](const std::string& method, double each) {
+    auto system = fluid(2, false);
+    system->box.bath = {.type = Bath::Type::andersen, .rate = each};
+    test::run_until<3>(std::move(system), method, 0.01, 0.02);
+  };
+  EXPECT_EQ(message([&] { rate("edda", 1e4); }), "");
+  EXPECT_EQ(
+      message([&] { rate("edda", 1e9); }),
+      "the bath would kick each particle 1e+07 times in 0.01 units of time, and only the last kick matters; take a "
+      "rate of at most 10000 (in step 1, from time 0)");
+  EXPECT_EQ(
+      message([&] { rate("free-flight", 1e300); }),
+      "the bath would kick each particle 1e+298 times in 0.01 units of time; take a smaller rate (in step 1, from "
+      "time 0)");
 }
 
 }  // namespace

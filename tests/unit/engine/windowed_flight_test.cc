@@ -20,11 +20,12 @@ struct Way {
   double in_cache = SearchOptions{}.in_cache;
   std::function<double()> window{};
   std::uint64_t limit = std::numeric_limits<std::uint64_t>::max();
+  std::uint64_t contacts = std::numeric_limits<std::uint64_t>::max();  ///< of a slab
 };
 
 template <int D>
 Outcome<D> whole(const Case<D>& c, std::uint64_t limit = std::numeric_limits<std::uint64_t>::max(),
-                 Counters* counted = nullptr) {
+                 Counters* counted = nullptr, std::uint64_t contacts = std::numeric_limits<std::uint64_t>::max()) {
   Outcome<D> out;
   out.particles = c.system->particles;
   Particles<D>& p = out.particles;
@@ -33,8 +34,8 @@ Outcome<D> whole(const Case<D>& c, std::uint64_t limit = std::numeric_limits<std
   Counters counters;
   for (int k = 0; k < c.slabs && counters.sphere_sphere < limit; ++k) {
     core.load(p, c.g, c.slab);
-    const double reached =
-        core.run(c.slab, {.counters = counters, .contacts = &out.contacts, .collision_limit = limit});
+    const double reached = core.run(
+        c.slab, {.counters = counters, .contacts = &out.contacts, .collision_limit = limit, .contact_limit = contacts});
     core.fly_to(reached, p);
     for (std::size_t i = 0; i < p.size(); ++i) box.wrap(p.x[i], p.image[i]);
     box.time += reached;
@@ -59,8 +60,9 @@ Outcome<D> divided(const Case<D>& c, const Way& way, Counters* counted = nullptr
     std::vector<Contact<D>> contacts;
     for (int k = 0; k < c.slabs && counters.sphere_sphere < way.limit; ++k) {
       flight.take(p, c.g, c.slab);
-      const double reached =
-          flight.run(c.slab, {.counters = counters, .contacts = &contacts, .collision_limit = way.limit});
+      const double reached = flight.run(
+          c.slab,
+          {.counters = counters, .contacts = &contacts, .collision_limit = way.limit, .contact_limit = way.contacts});
       flight.give_back(reached, p);
       system.wrap();
       system.box.time += reached;
@@ -322,6 +324,26 @@ TEST(WindowedFlight, EndsAtACollision) {
     ASSERT_EQ(reference.contacts.size(), limit);
     for (const int subdomains : {1, 3, 8})
       expect_same(reference, divided(c, {.subdomains = subdomains, .limit = limit}), std::to_string(limit));
+  }
+}
+
+/// Slabs that end after a number of contacts with walls and of pairs, or at a collision before that.
+TEST(WindowedFlight, EndsAtAContact) {
+  const Case<3> c{.system = random_system<3>(150, {7, 6, 6}, {W, P, W}, 0.5, 0.5, 5), .slab = 1, .slabs = 3};
+  for (const std::uint64_t contacts : {1, 2, 100, 300}) {
+    for (const std::uint64_t limit : {50, 10000}) {
+      Counters counted;
+      const auto reference = whole(c, limit, &counted, contacts);
+      if (limit == 10000) {
+        ASSERT_EQ(reference.contacts.size(), 3 * contacts);
+      }
+      if (contacts == 300) {
+        EXPECT_GT(counted.sphere_wall, 0);
+      }
+      for (const int subdomains : {1, 3, 8})
+        expect_same(reference, divided(c, {.subdomains = subdomains, .limit = limit, .contacts = contacts}),
+                    std::to_string(contacts) + " " + std::to_string(limit));
+    }
   }
 }
 
