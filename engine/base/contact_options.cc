@@ -20,7 +20,8 @@ const std::vector<Parameter>& contact_parameters() {
                          "the contact leaves; -1 smooth, 0 they stick, 1 perfectly rough. Spheres then have a spin"};
     tangential.most = 1;
     return std::vector<Parameter>{
-        {"between", text_list, "", "-", "two species, or a species and a wall (x-, x+, … or its name); \"*\": all species and all walls"},
+        {"between", text_list, "", "-",
+         "two species, or a species and a wall (x-, x+, … or its name); \"*\": all species and all walls"},
         restitution,
         tangential,
         {"friction", real, "none", "-",

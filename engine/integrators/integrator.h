@@ -38,8 +38,7 @@ struct SlabReport {
   std::function<void(double, const Particles<D>&)> observer{};  ///< gets copies moved to each of these times
   SlabWatch* watch = nullptr;  ///< lets stepping methods abandon a long slab; null: it is always completed
   double boxes = 0;            ///< set by free flight: PastEpoch::boxes of this slab and rank
-  double reached =
-      0;  ///< set by the integrator: the time reached within the slab; below the length only at a limit
+  double reached = 0;  ///< set by the integrator: the time reached within the slab; below the length only at a limit
 };
 
 template <int D>

@@ -125,7 +125,7 @@ ContactTally WindowPaths<D>::tally() const {
   ContactTally tally;
   for (std::uint32_t n = 0; n < trace_.events().size(); ++n) {
     const auto& event = trace_.events()[n];
-    const auto [lo, hi] = event.slot;
+    const Slot lo = event.slot[0], hi = event.slot[1];  // clang 14 cannot capture a structured binding
     if (!ownership_.owns(lo) || paths_.has(lo)) continue;
     const bool pair = hi != kNoEntry;
     if (pair) {

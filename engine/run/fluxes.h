@@ -4,8 +4,8 @@
 //
 //   S = Σ m v v + Σ d F + Σ d J δ(t − t_c),   Q = Σ e v + ½ Σ d F·(v_i + v_j) + Σ d ΔE δ(t − t_c),
 //
-// with e = ½ m v² + ½ Σ V, sums over particles, over pairs (d = x_i − x_j of each image within the cutoff, F the force on
-// i) and over collisions (J the impulse on i, ΔE the energy that i gets, d of the image that is touched).
+// with e = ½ m v² + ½ Σ V, sums over particles, over pairs (d = x_i − x_j of each image within the cutoff, F the force
+// on i) and over collisions (J the impulse on i, ΔE the energy that i gets, d of the image that is touched).
 //
 // The integrals over time are sums of what passes during each interval. They are not differences of Σ m x v_y and
 // Σ e x, which are no functions of the state in a periodic box (Erpenbeck, Phys. Rev. E 51 (1995) 4296). Σ m v v and

@@ -282,7 +282,9 @@ void replay_journal(const std::filesystem::path& path) {
   if (not_writable != 0) file = Descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (!file.is_open()) return;  // opening the file itself reports the reason
   if (!lock(file.number(), LOCK_SH))
-    throw Error(Failure::file, path.string() + ": a process is writing this file; wait for its end, or read it by Python's carom.open()");
+    throw Error(
+        Failure::file,
+        path.string() + ": a process is writing this file; wait for its end, or read it by Python's carom.open()");
   const Descriptor journal(::open(beside.c_str(), O_RDONLY | O_CLOEXEC));
   struct stat status {};
   if (!journal.is_open() || ::fstat(journal.number(), &status) != 0) return;

@@ -44,9 +44,10 @@ std::vector<Parameter> with_cut(std::vector<Parameter> own, std::string_view abs
 }
 
 std::vector<Parameter> with_pair_options(std::vector<Parameter> own) {
-  own = with_cut(std::move(own),
-                 "distance at which the potential ends; required in a periodic box, where all images within it count, a "
-                 "particle's own too; absent: it does not end");
+  own =
+      with_cut(std::move(own),
+               "distance at which the potential ends; required in a periodic box, where all images within it count, a "
+               "particle's own too; absent: it does not end");
   own.push_back(
       {"tail", Parameter::Type::boolean, "false", "-",
        "whether the reported energies and pressures include the contribution of a uniform fluid beyond the cutoff; "

@@ -12,6 +12,7 @@ import numpy as np
 from carom import lammps_data
 from carom.errors import FileError, UsageError
 
+
 def package(name, debian):
     try:
         return importlib.import_module(name)

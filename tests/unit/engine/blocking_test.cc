@@ -52,8 +52,8 @@ TEST(Blocking, MeansScatterAsTheErrorsPredict) {
   }
 }
 
-/// A series that is extended to the number of samples that it asks for gets an error, at the latest with 200 independent
-/// samples.
+/// A series that is extended to the number of samples that it asks for gets an error, at the latest with 200
+/// independent samples.
 TEST(Blocking, WithoutAnErrorItSaysHowManySamplesMayGiveOne) {
   EXPECT_EQ(Blocking(1).estimate(0).needed, 8);
   constexpr double phi = 0.98;
