@@ -25,11 +25,16 @@ void in_pieces(std::size_t size, Start&& start) {
 
 }  // namespace
 
+MpiCommunicator::MpiCommunicator(MPI_Comm world, Watch& watch) : world_(world), watch_(watch) {
+  MPI_Comm_rank(world_, &rank_);
+  MPI_Comm_size(world_, &size_);
+}
+
 /// Recursive doubling: log2 P exchanges, each waited for with polls for failures. (A blocking MPI_Allreduce cannot be
 /// left; MPI_Iallreduce takes three times as long.) The value of the lower rank comes first, so that all ranks get the
 /// same bits.
 void MpiCommunicator::combine(std::span<double> most, std::span<std::uint64_t> sums) {
-  ranks_.watch().begin_call();
+  watch_.begin_call();
   begin_combine(most, sums);
   end_combine();
 }
@@ -41,7 +46,7 @@ void MpiCommunicator::begin_combine(std::span<double> most, std::span<std::uint6
   for (const double value : most) mine_.push_back(std::bit_cast<std::uint64_t>(value));
   theirs_.resize(mine_.size());
   // Ranks beyond the largest power of two send their values to a rank below it, which sends the result back.
-  const int rank = ranks_.rank(), size = ranks_.size();
+  const int rank = rank_, size = size_;
   int whole = 1;
   while (2 * whole <= size) whole *= 2;
   rounds_.clear();
@@ -62,8 +67,8 @@ void MpiCommunicator::begin_round() {
   if (round_ == rounds_.size()) return;
   const auto [partner, tag, sends, receives] = rounds_[round_];
   const int length = bytes(mine_.size() * sizeof(std::uint64_t));
-  if (receives) MPI_Irecv(theirs_.data(), length, MPI_BYTE, partner, tag, ranks_.handle(), &combining_[0]);
-  if (sends) MPI_Isend(mine_.data(), length, MPI_BYTE, partner, tag, ranks_.handle(), &combining_[1]);
+  if (receives) MPI_Irecv(theirs_.data(), length, MPI_BYTE, partner, tag, world_, &combining_[0]);
+  if (sends) MPI_Isend(mine_.data(), length, MPI_BYTE, partner, tag, world_, &combining_[1]);
 }
 
 void MpiCommunicator::end_combine() {
@@ -71,10 +76,10 @@ void MpiCommunicator::end_combine() {
     return std::bit_cast<std::uint64_t>(std::max(std::bit_cast<double>(a), std::bit_cast<double>(b)));
   };
   for (; round_ < rounds_.size(); ++round_, begin_round()) {
-    ranks_.watch().wait(combining_);
+    watch_.wait(combining_);
     const auto [partner, tag, sends, receives] = rounds_[round_];
     if (!receives) continue;
-    if (partner < ranks_.rank()) mine_.swap(theirs_);
+    if (partner < rank_) mine_.swap(theirs_);
     if (round_ > 0 && !rounds_[round_ - 1].receives) continue;  // it has sent its values before: this is the result
     for (std::size_t k = 0; k < mine_.size(); ++k)
       mine_[k] = k < sums_.size() ? mine_[k] + theirs_[k] : larger(mine_[k], theirs_[k]);
@@ -85,12 +90,12 @@ void MpiCommunicator::end_combine() {
 
 void MpiCommunicator::start(std::vector<Bytes> outgoing, std::span<const int> partners,
                             std::span<const std::size_t> sizes, std::span<double> most) {
-  ranks_.watch().begin_call();
+  watch_.begin_call();
   departures_[0].messages.swap(departures_[1].messages);
   departures_[0].requests.swap(departures_[1].requests);
   std::vector<Bytes>& messages = departures_[0].messages;
   std::vector<MPI_Request>& requests = departures_[0].requests;
-  if (!requests.empty()) ranks_.watch().wait(requests);
+  if (!requests.empty()) watch_.wait(requests);
   requests.clear();
   messages = std::move(outgoing);
   arriving_.resize(partners.size());
@@ -98,34 +103,33 @@ void MpiCommunicator::start(std::vector<Bytes> outgoing, std::span<const int> pa
     Bytes &in = arriving_[k], &out = messages[k];
     in.resize(sizes[k]);
     in_pieces(in.size(), [&](std::size_t at, int count) {
-      MPI_Irecv(in.data() + at, count, MPI_BYTE, partners[k], known, ranks_.handle(),
+      MPI_Irecv(in.data() + at, count, MPI_BYTE, partners[k], known, world_,
                 &receiving_.emplace_back(MPI_REQUEST_NULL));
     });
     in_pieces(out.size(), [&](std::size_t at, int count) {
-      MPI_Isend(out.data() + at, count, MPI_BYTE, partners[k], known, ranks_.handle(),
-                &requests.emplace_back(MPI_REQUEST_NULL));
+      MPI_Isend(out.data() + at, count, MPI_BYTE, partners[k], known, world_, &requests.emplace_back(MPI_REQUEST_NULL));
     });
   }
   begin_combine(most, {});
 }
 
 std::vector<Bytes> MpiCommunicator::complete() {
-  ranks_.watch().begin_call();
-  if (!receiving_.empty()) ranks_.watch().wait(receiving_);
+  watch_.begin_call();
+  if (!receiving_.empty()) watch_.wait(receiving_);
   receiving_.clear();
   end_combine();
   return std::move(arriving_);
 }
 
 std::vector<Bytes> MpiCommunicator::trade(const std::function<const Bytes&(std::size_t)>& outgoing) {
-  ranks_.watch().begin_call();
+  watch_.begin_call();
   const auto p = static_cast<std::size_t>(size());
   leaving_.resize(p);
   coming_.resize(p);
   for (std::size_t r = 0; r < p; ++r) leaving_[r] = outgoing(r).size();
   MPI_Request sizes = MPI_REQUEST_NULL;
-  MPI_Ialltoall(leaving_.data(), 1, MPI_UINT64_T, coming_.data(), 1, MPI_UINT64_T, ranks_.handle(), &sizes);
-  ranks_.watch().wait({&sizes, 1});
+  MPI_Ialltoall(leaving_.data(), 1, MPI_UINT64_T, coming_.data(), 1, MPI_UINT64_T, world_, &sizes);
+  watch_.wait({&sizes, 1});
 
   incoming_.assign(p, {});
   std::vector<MPI_Request> requests;
@@ -135,13 +139,13 @@ std::vector<Bytes> MpiCommunicator::trade(const std::function<const Bytes&(std::
     if (other == rank()) continue;
     incoming_[r].resize(coming_[r]);
     in_pieces(coming_[r], [&](std::size_t at, int count) {
-      MPI_Irecv(incoming_[r].data() + at, count, MPI_BYTE, other, data, ranks_.handle(), next());
+      MPI_Irecv(incoming_[r].data() + at, count, MPI_BYTE, other, data, world_, next());
     });
     in_pieces(leaving_[r], [&](std::size_t at, int count) {
-      MPI_Isend(outgoing(r).data() + at, count, MPI_BYTE, other, data, ranks_.handle(), next());
+      MPI_Isend(outgoing(r).data() + at, count, MPI_BYTE, other, data, world_, next());
     });
   }
-  if (!requests.empty()) ranks_.watch().wait(requests);
+  if (!requests.empty()) watch_.wait(requests);
   return std::move(incoming_);
 }
 
@@ -156,7 +160,7 @@ std::vector<Bytes> MpiCommunicator::swap(std::vector<Bytes> outgoing) {
 
 /// The first message to a neighbour has the length and as much of the data as fits; few need a second message.
 std::vector<Bytes> MpiCommunicator::swap(std::vector<Bytes> outgoing, std::span<const int> partners) {
-  ranks_.watch().begin_call();
+  watch_.begin_call();
   outgoing_ = std::move(outgoing);
   incoming_.resize(partners.size());
   first_in_.resize(partners.size());
@@ -171,10 +175,10 @@ std::vector<Bytes> MpiCommunicator::swap(std::vector<Bytes> outgoing, std::span<
     put(out, std::uint64_t{all.size()});
     out.insert(out.end(), all.begin(), all.begin() + static_cast<std::ptrdiff_t>(std::min(all.size(), kFirstMessage)));
     in.resize(sizeof(std::uint64_t) + kFirstMessage);
-    MPI_Irecv(in.data(), bytes(in.size()), MPI_BYTE, partners[k], first, ranks_.handle(), next());
-    MPI_Isend(out.data(), bytes(out.size()), MPI_BYTE, partners[k], first, ranks_.handle(), next());
+    MPI_Irecv(in.data(), bytes(in.size()), MPI_BYTE, partners[k], first, world_, next());
+    MPI_Isend(out.data(), bytes(out.size()), MPI_BYTE, partners[k], first, world_, next());
   }
-  ranks_.watch().wait(requests);
+  watch_.wait(requests);
   requests.clear();
   for (std::size_t k = 0; k < partners.size(); ++k) {
     Reader reader(first_in_[k]);
@@ -183,14 +187,14 @@ std::vector<Bytes> MpiCommunicator::swap(std::vector<Bytes> outgoing, std::span<
     if (!in.empty()) std::memcpy(in.data(), reader.skip(0), std::min(in.size(), kFirstMessage));
     if (in.size() > kFirstMessage)
       in_pieces(in.size() - kFirstMessage, [&](std::size_t at, int count) {
-        MPI_Irecv(in.data() + kFirstMessage + at, count, MPI_BYTE, partners[k], data, ranks_.handle(), next());
+        MPI_Irecv(in.data() + kFirstMessage + at, count, MPI_BYTE, partners[k], data, world_, next());
       });
     if (out.size() > kFirstMessage)
       in_pieces(out.size() - kFirstMessage, [&](std::size_t at, int count) {
-        MPI_Isend(out.data() + kFirstMessage + at, count, MPI_BYTE, partners[k], data, ranks_.handle(), next());
+        MPI_Isend(out.data() + kFirstMessage + at, count, MPI_BYTE, partners[k], data, world_, next());
       });
   }
-  if (!requests.empty()) ranks_.watch().wait(requests);
+  if (!requests.empty()) watch_.wait(requests);
   return std::exchange(incoming_, std::move(outgoing_));  // the next messages reuse the memory
 }
 

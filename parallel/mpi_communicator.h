@@ -9,17 +9,17 @@
 #include <array>
 
 #include "engine/ranks/communicator.h"
-#include "parallel/world.h"
+#include "parallel/watch.h"
 
 namespace carom {
 
 class MpiCommunicator : public Communicator {
  public:
-  /// Stores a reference. Requires several ranks.
-  explicit MpiCommunicator(const World& ranks) : ranks_(ranks) {}
+  /// Stores both. Its calls require several ranks.
+  MpiCommunicator(MPI_Comm world, Watch& watch);
 
-  int rank() const override { return ranks_.rank(); }
-  int size() const override { return ranks_.size(); }
+  int rank() const override { return rank_; }
+  int size() const override { return size_; }
   std::vector<Bytes> swap(std::vector<Bytes> outgoing) override;
   std::vector<Bytes> swap(std::vector<Bytes> outgoing, std::span<const int> partners) override;
   std::vector<Bytes> gather(const Bytes& mine) override;
@@ -27,7 +27,7 @@ class MpiCommunicator : public Communicator {
   void start(std::vector<Bytes> outgoing, std::span<const int> partners, std::span<const std::size_t> sizes,
              std::span<double> most) override;
   std::vector<Bytes> complete() override;
-  double seconds_waited() const override { return ranks_.watch().seconds_waited(); }
+  double seconds_waited() const override { return watch_.seconds_waited(); }
 
  private:
   /// An exchange of combine() with another rank.
@@ -40,7 +40,9 @@ class MpiCommunicator : public Communicator {
   void end_combine();
   std::vector<Bytes> trade(const std::function<const Bytes&(std::size_t)>& outgoing);
 
-  const World& ranks_;
+  MPI_Comm world_;
+  Watch& watch_;
+  int rank_ = 0, size_ = 1;
   // Buffers of received messages, and of messages sent by swap().
   std::vector<std::uint64_t> leaving_, coming_;
   std::vector<Bytes> incoming_, outgoing_;

@@ -19,31 +19,12 @@
 #include <list>
 #include <optional>
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "parallel/world.h"
+
 namespace carom {
-
-/// Another rank has failed; the message names it.
-class RankFailure : public std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-/// Some ranks do not answer; the message names them.
-class SilentRanks : public std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-/// Exit code for faults that are not errors of the deck or files: bugs, lack of memory, lost ranks.
-constexpr int kFault = 70;
-
-/// The end of a rank's work.
-struct Outcome {
-  int code = 0;
-  std::string failure{};  ///< why it failed; empty if it did not
-  bool left = false;      ///< it left a call in which it waited for other ranks
-};
 
 /// The length of a wait [seconds], without time in which this process did not run.
 class WaitTimer {

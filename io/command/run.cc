@@ -28,7 +28,7 @@
 #include "io/files/text_file.h"
 #include "io/files/version.h"
 #include "io/view/view.h"
-#include "parallel/mpi_communicator.h"
+#include "parallel/world.h"
 
 namespace carom {
 
@@ -251,9 +251,7 @@ int run_command(const RunOptions& options) {
   hdf5::start_library();
   const World ranks(options.silence);
   Communicator alone;
-  std::optional<MpiCommunicator> team;
-  if (ranks.size() > 1) team.emplace(ranks);
-  Communicator& all = team ? *team : alone;
+  Communicator& all = ranks.communicator();
 
   Deck deck;
   std::optional<Resumed> from;

@@ -2,7 +2,6 @@
 #include "io/files/version.h"
 
 #include <hdf5.h>
-#include <mpi.h>
 #include <spdlog/version.h>
 #include <toml++/toml.h>
 
@@ -12,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "git_commit.h"
+#include "parallel/world.h"
 
 namespace carom {
 
@@ -37,13 +37,9 @@ std::string compiler_string() {
 std::string library_versions() {
   unsigned major = 0, minor = 0, release = 0;
   H5get_libversion(&major, &minor, &release);
-  char mpi[MPI_MAX_LIBRARY_VERSION_STRING];
-  int length = 0;
-  MPI_Get_library_version(mpi, &length);
-  std::string mpi_version(mpi, static_cast<std::size_t>(length));
-  mpi_version.resize(std::min(mpi_version.find(','), mpi_version.size()));
-  return mpi_version + ", HDF5 " + dotted(static_cast<int>(major), static_cast<int>(minor), static_cast<int>(release)) +
-         ", Eigen " + dotted(EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION) + ", Boost " +
+  return mpi_version() + ", HDF5 " +
+         dotted(static_cast<int>(major), static_cast<int>(minor), static_cast<int>(release)) + ", Eigen " +
+         dotted(EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION) + ", Boost " +
          dotted(BOOST_VERSION / 100000, BOOST_VERSION / 100 % 1000, BOOST_VERSION % 100) + ", toml++ " +
          dotted(TOML_LIB_MAJOR, TOML_LIB_MINOR, TOML_LIB_PATCH) + ", CLI11 " CLI11_VERSION ", spdlog " +
          dotted(SPDLOG_VER_MAJOR, SPDLOG_VER_MINOR, SPDLOG_VER_PATCH) + ", nlohmann-json " +

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Makes wheels of the package carom, for pip (PEP 517), by the CMake of this repository; needs Python alone besides.
 
-A wheel holds the package, its compiled part and the command carom. It is for the machine that it is built on: it uses
-the libraries there. Objects stay in build/pip-… and are used again; ccache shares them with other builds.
+A wheel holds the package, its compiled part and the command carom, without MPI. Both contain the libraries that they
+use, and need those of glibc alone (CAROM_PORTABLE). CMAKE_ARGS in the environment holds further arguments for CMake; with
+"-DCAROM_PORTABLE=OFF" the wheel uses the libraries, and MPI, of the machine that it is built on.
+
+Objects stay in build/pip-… and are used again; ccache shares them with other builds.
 """
 
 import base64
@@ -10,6 +13,7 @@ import hashlib
 import os
 import pathlib
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -20,26 +24,22 @@ import zipfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-
-
-def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
-    project, version = project_and_version()
-    folder = pathlib.Path(metadata_directory) / f"carom-{version}.dist-info"
-    folder.mkdir()
-    for name, content in about(project, version).items():
-        (folder.parent / name).write_bytes(content)
-    return folder.name
+GLIBC = {"libc.so.6", "libm.so.6", "ld-linux-x86-64.so.2", "ld-linux-aarch64.so.1"}
+# The Debian packages of the libraries that a wheel contains; those of which it contains headers are in cmake/copyright.
+CONTAINED = "libhdf5-dev", "libaec-dev", "zlib1g-dev", "libdeflate-dev", "libstdc++-*-dev"
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     project, version = project_and_version()
     files = {f"carom/{name}": content for name, content in built_package().items()}
+    command = build_folder() / "io" / "carom"
     scripts = f"carom-{version}.data/scripts/"
-    files[f"{scripts}carom"] = (build_folder() / "io" / "carom").read_bytes()
-    files |= about(project, version)
+    files[f"{scripts}carom"] = command.read_bytes()
+    tag = "cp{0}{1}-cp{0}{1}-{2}".format(*sys.version_info[:2], platform(command, *build_folder().glob("io/python/carom/_carom*.so")))
+    files |= about(project, version, tag)
     record = "".join(f"{name},sha256={digest(content)},{len(content)}\n" for name, content in files.items())
     files[f"carom-{version}.dist-info/RECORD"] = (record + f"carom-{version}.dist-info/RECORD,,\n").encode()
-    name = f"carom-{version}-{tag()}.whl"
+    name = f"carom-{version}-{tag}.whl"
     with zipfile.ZipFile(pathlib.Path(wheel_directory) / name, "w", zipfile.ZIP_DEFLATED) as wheel:
         for path, content in files.items():
             entry = zipfile.ZipInfo(path)
@@ -58,15 +58,26 @@ def project_and_version():
     return project, re.search(r"project\(carom VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text())[1]
 
 
-def tag():
-    return "cp{0}{1}-cp{0}{1}-{2}".format(*sys.version_info[:2], re.sub(r"\W", "_", sysconfig.get_platform()))
+def platform(*binaries):
+    """manylinux, with the oldest glibc on which these run, if they need no other library; else this machine's platform."""
+    if sys.platform == "linux":
+        needs = subprocess.run(["objdump", "-p", *binaries], capture_output=True, text=True, check=True).stdout
+        if set(re.findall(r"NEEDED +(\S+)", needs)) <= GLIBC:
+            oldest = max((int(major), int(minor)) for major, minor in re.findall(r"GLIBC_(\d+)\.(\d+)", needs))
+            return "manylinux_{}_{}_{}".format(*oldest, os.uname().machine)
+    return re.sub(r"\W", "_", sysconfig.get_platform())
 
 
-def about(project, version):
+def about(project, version, tag):
     """The files of the dist-info but RECORD."""
     info = f"carom-{version}.dist-info"
-    return {f"{info}/METADATA": metadata(project, version).encode(), f"{info}/LICENSE": (ROOT / "LICENSE").read_bytes(),
-            f"{info}/WHEEL": f"Wheel-Version: 1.0\nGenerator: carom\nRoot-Is-Purelib: false\nTag: {tag()}\n".encode()}
+    files = {f"{info}/METADATA": metadata(project, version).encode(), f"{info}/LICENSE": (ROOT / "LICENSE").read_bytes(),
+             f"{info}/licenses/headers": (ROOT / "cmake/copyright").read_bytes(),
+             f"{info}/WHEEL": f"Wheel-Version: 1.0\nGenerator: carom\nRoot-Is-Purelib: false\nTag: {tag}\n".encode()}
+    if "manylinux" in tag:
+        found = [file for name in CONTAINED for file in pathlib.Path("/usr/share/doc").glob(f"{name}/copyright")]
+        files |= {f"{info}/licenses/{file.parent.name}": file.read_bytes() for file in found}
+    return files
 
 
 def build_folder():
@@ -78,7 +89,8 @@ def built_package():
     folder = build_folder()
     generator = ["-G", "Ninja"] if shutil.which("ninja") else []
     run("cmake", "-S", ROOT, "-B", folder, *(generator if not (folder / "CMakeCache.txt").exists() else []),
-        "-DCMAKE_BUILD_TYPE=Release", "-DCAROM_BUILD_TESTS=OFF", f"-DPython3_EXECUTABLE={sys.executable}")
+        "-DCMAKE_BUILD_TYPE=Release", "-DCAROM_BUILD_TESTS=OFF", "-DCAROM_UNITY=ON", "-DCAROM_PORTABLE=ON", f"-DPython3_EXECUTABLE={sys.executable}",
+        *shlex.split(os.environ.get("CMAKE_ARGS", "")))
     run("cmake", "--build", folder, "--parallel", str(len(os.sched_getaffinity(0))), "--target", "carom_python", "carom")
     with tempfile.TemporaryDirectory() as staged:
         run("cmake", "--install", folder, "--prefix", staged, "--component", "python")
@@ -102,4 +114,5 @@ def digest(content):
 def run(*command):
     done = subprocess.run([str(part) for part in command])
     if done.returncode != 0:
-        raise SystemExit(f"{' '.join(map(str, command))} failed; tools/build-packages.txt lists the Debian packages that the build needs")
+        raise SystemExit(f"{' '.join(map(str, command))} failed; tools/build-packages.txt and "
+                         "tools/wheel-packages.txt list the Debian packages that the build needs")

@@ -15,9 +15,10 @@
 //   stopped   rank 1 is stopped
 //   late      rank 1 computes longer than the silence and is treated as lost
 //   suspended all are stopped for longer than the silence, and continue without an error
-//   calls     the calls of MpiCommunicator give the expected results
+//   calls     the calls of the communicator give the expected results
 //   latency   microseconds of the calls, beside MPI_Allreduce
 
+#include <mpi.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -33,14 +34,14 @@
 #include <thread>
 
 #include "engine/base/error.h"
-#include "parallel/mpi_communicator.h"
+#include "parallel/world.h"
 
 namespace {
 
 using carom::Bytes;
+using carom::Communicator;
 using carom::Error;
 using carom::Failure;
-using carom::MpiCommunicator;
 
 void sleep(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
 
@@ -62,7 +63,7 @@ Bytes filled(std::size_t size, int from, int to) {
 }
 
 /// Checks all functions of a Communicator with messages of all sizes.
-void check_calls(MpiCommunicator& ranks) {
+void check_calls(Communicator& ranks) {
   const int rank = ranks.rank(), size = ranks.size();
   for (const std::size_t length : {std::size_t{0}, std::size_t{1}, std::size_t{1000}, std::size_t{3000000}}) {
     // Rank a sends a message to b if a + b is not a multiple of 3.
@@ -130,11 +131,11 @@ void check_calls(MpiCommunicator& ranks) {
   require(counts[0] == static_cast<std::uint64_t>(size) && counts[1] == high, "sum");
 }
 
-void measure(MpiCommunicator& ranks, MPI_Comm world) {
+void measure(Communicator& ranks) {
   const auto show = [&](const char* name, const auto& call) {
     std::vector<double> times;
     for (int k = 0; k < 101; ++k) {
-      MPI_Barrier(world);
+      MPI_Barrier(MPI_COMM_WORLD);
       const double start = MPI_Wtime();
       for (int i = 0; i < 1000; ++i) call();
       times.push_back(1e3 * (MPI_Wtime() - start));
@@ -143,7 +144,7 @@ void measure(MpiCommunicator& ranks, MPI_Comm world) {
     if (ranks.rank() == 0) std::printf("%-28s %8.2f µs, at best %.2f\n", name, times[50], times[0]);
   };
   double value = 1, most = 0;
-  show("MPI_Allreduce, 1 double", [&] { MPI_Allreduce(&value, &most, 1, MPI_DOUBLE, MPI_MAX, world); });
+  show("MPI_Allreduce, 1 double", [&] { MPI_Allreduce(&value, &most, 1, MPI_DOUBLE, MPI_MAX, MPI_COMM_WORLD); });
   show("largest, 1 double", [&] { ranks.largest({&value, 1}); });
   const std::vector<Bytes> nothing(static_cast<std::size_t>(ranks.size()));
   show("swap, nothing", [&] { ranks.swap(nothing); });
@@ -155,7 +156,7 @@ void measure(MpiCommunicator& ranks, MPI_Comm world) {
   show("swap in pairs, 1000 bytes", [&] { ranks.swap(messages, partners); });
 }
 
-int all(const std::string& what, MpiCommunicator& ranks, MPI_Comm world) {
+int all(const std::string& what, Communicator& ranks) {
   const auto meet = [&] {
     double value = 0;
     ranks.largest({&value, 1});
@@ -163,7 +164,7 @@ int all(const std::string& what, MpiCommunicator& ranks, MPI_Comm world) {
   for (int k = 0; k < 3; ++k) meet();
   const bool is_one = ranks.rank() == 1;
   if (what == "calls") check_calls(ranks);
-  if (what == "latency") measure(ranks, world);
+  if (what == "latency") measure(ranks);
   if (what == "alike") {
     sleep(0.3 * ranks.rank());
     throw Error(Failure::numerical, "no rank can do this");
@@ -199,11 +200,10 @@ int all(const std::string& what, MpiCommunicator& ranks, MPI_Comm world) {
 int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "ok";
   const carom::World ranks(argc > 2 ? std::stod(argv[2]) : 0);
-  MpiCommunicator exchange(ranks);
   const bool alone = what == "ok" || what == "error" || what == "bug";
   const auto together = [&] {
     try {
-      return all(what, exchange, ranks.handle());
+      return all(what, ranks.communicator());
     } catch (const carom::RankFailure& e) {
       std::cout << "received: " << e.what() << std::endl;
       throw;
