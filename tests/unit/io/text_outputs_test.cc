@@ -283,7 +283,8 @@ TEST(Averages, AreWrittenWheneverTheirSamplesHaveDoubled) {
     EXPECT_EQ(fs::remove(path), std::has_single_bit(sample)) << sample;
   }
   writer.close();
-  EXPECT_TRUE(contents(path).starts_with("x,density,temperature,density_small,density_large,error_density,"))
+  EXPECT_TRUE(contents(path).starts_with(
+      "x,density,temperature,velocity_x,velocity_y,density_small,density_large,temperature_small,"))
       << contents(path);
 }
 
