@@ -62,8 +62,9 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         folder = options.output or pathlib.Path(scratch)
         folder.mkdir(parents=True, exist_ok=True)
-        for deck in (ROOT / "inputs").glob("*.toml"):
-            shutil.copy(deck, folder)
+        for deck in (ROOT / "inputs").rglob("*.toml"):
+            (copy := folder / deck.relative_to(ROOT / "inputs")).parent.mkdir(exist_ok=True)
+            shutil.copy(deck, copy)
         renewed, at, printed, wrong = [], 0, "", 0
         for block in BLOCK.finditer(text):
             kind, body = block[1], block[2]
