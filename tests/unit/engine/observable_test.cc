@@ -9,6 +9,7 @@
 #include <map>
 
 #include "engine/base/error.h"
+#include "engine/base/random.h"
 #include "tests/support/experiments.h"
 
 namespace carom {
@@ -148,6 +149,36 @@ TEST(Profile, PressuresAddUpToThePressureTensor) {
       // Kinetic parts at samples here, their exact integral there: they differ in free flight.
       EXPECT_NEAR(mean, symmetric, forces ? 0.05 : 0.1) << name << (forces ? " with forces" : "");
     }
+  }
+}
+
+/// Samples that do not depend on each other: the errors are those of numbers and temperatures that are drawn afresh. A
+/// fixed disc counts in the density and has no temperature.
+TEST(Profile, ErrorsAreThoseOfIndependentSamples) {
+  constexpr int kMoving = 10, kSamples = 2000;
+  auto system =
+      test::make_system<2>({8, 5}, Boundary::periodic, std::vector<Vec<2>>(kMoving + 1, Vec<2>(1, 1)),
+                           std::vector<Vec<2>>(kMoving + 1, Vec<2>::Zero()), {}, std::vector<double>(kMoving + 1, 2.0));
+  system->particles.mass[kMoving] = std::numeric_limits<double>::infinity();
+  const auto profile = make_observable("profile", *system, {{"interval", 1.0}, {"bins", 2}});
+  RandomStream random(1, RandomPurpose::probe, 0);
+  for (int n = 0; n < kSamples; ++n) {
+    for (int i = 0; i < kMoving; ++i) {
+      system->particles.x[i][0] = 8 * random.uniform();
+      const auto pair = random.normal_pair();
+      system->particles.v[i] = {pair[0], pair[1]};
+    }
+    profile->sample(n, system->particles);
+  }
+  const auto table = profile->table();
+  ASSERT_EQ(table[3].name, "error_density");
+  ASSERT_EQ(table[5].name, "error_temperature");
+  for (const std::size_t bin : {0, 1}) {
+    EXPECT_NEAR(table[1].values[bin], (bin == 0 ? 6.0 : 5.0) / 20, 5 * std::sqrt(2.5 / kSamples) / 20) << bin;
+    EXPECT_NEAR(table[3].values[bin], std::sqrt(2.5 / kSamples) / 20, 0.3 * table[3].values[bin]) << bin;
+    // m v² of a degree of freedom has the mean 2 and the variance 8; there are 2 · 5 of them in a bin on average.
+    EXPECT_NEAR(table[2].values[bin], 2, 5 * std::sqrt(0.8 / kSamples)) << bin;
+    EXPECT_NEAR(table[5].values[bin], std::sqrt(0.8 / kSamples), 0.3 * table[5].values[bin]) << bin;
   }
 }
 
