@@ -24,7 +24,8 @@ def test_a_page_prints_what_it_says(page):
 
 
 def test_the_guide_has_small_pictures():
-    assert len(GUIDE) > 1 and max(file.stat().st_size for file in (ROOT / "inputs" / "guide").glob("*.png")) < 60000
+    assert len(GUIDE) > 12 and all("![" in page.read_text() for page in GUIDE)
+    assert max(file.stat().st_size for file in (ROOT / "inputs" / "guide").glob("*.png")) < 60000
 
 
 def test_links_lead_somewhere():
