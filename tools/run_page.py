@@ -4,7 +4,7 @@
 
     tools/run_page.py inputs/tutorials/1-equation-of-state.md             # in a temporary directory
     tools/run_page.py PAGE -o build/page                                  # in this one; pictures stay there
-    tools/run_page.py --renew PAGE                                        # writes the output into the page
+    tools/run_page.py --renew PAGE                                        # writes the output into the page, its pictures beside it
 
 Blocks marked `sh` are run by bash, those marked `python` by python3, both with the command, the tools and `import carom` at hand; a block
 marked `toml` is written to the file that its first line names (`# deck.toml`). A block marked `text` holds the exact output of the block
@@ -22,6 +22,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
+
+from PIL import Image
 
 from carom_files import one_line
 
@@ -56,14 +58,15 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("page", type=pathlib.Path)
     parser.add_argument("-o", "--output", type=pathlib.Path, help="the directory to run in")
-    parser.add_argument("--renew", action="store_true", help="write what was printed into the page")
+    parser.add_argument("--renew", action="store_true", help="write what was printed into the page, and the PNG pictures it shows beside it")
     options = parser.parse_args()
     text = options.page.read_text()
     with tempfile.TemporaryDirectory() as scratch:
         folder = options.output or pathlib.Path(scratch)
         folder.mkdir(parents=True, exist_ok=True)
-        for deck in (ROOT / "inputs").glob("*.toml"):
-            shutil.copy(deck, folder)
+        for deck in (ROOT / "inputs").rglob("*.toml"):
+            (copy := folder / deck.relative_to(ROOT / "inputs")).parent.mkdir(exist_ok=True)
+            shutil.copy(deck, copy)
         renewed, at, printed, wrong = [], 0, "", 0
         for block in BLOCK.finditer(text):
             kind, body = block[1], block[2]
@@ -77,6 +80,9 @@ def main():
             if printed != body and not options.renew:
                 print(f"{options.page}: the page says\n{body}and this was printed:\n{printed}")
                 wrong = 1
+        for picture in folder.glob("*.png"):
+            if options.renew and f"]({picture.name})" in text:
+                Image.open(picture).convert("RGB").quantize(64).save(options.page.with_name(picture.name), optimize=True)
     if options.renew:
         options.page.write_text("".join(renewed) + text[at:])
     sys.exit(wrong)

@@ -31,7 +31,7 @@ spheres.setRadii(new Float32Array(n).fill(0.5));
 spheres.setPositions(x);
 spheres.setValues(x.subarray(0, n), [0, edge]);
 spheres.setBox(edges, ["periodic", "periodic", "periodic"], false);
-camera.fit(edges, false, 1);
+camera.fit([0, 0, 0], edges, false, 1);
 camera.zoom(distance);
 let start, drawn = -2;
 for (start = performance.now(); drawn < 10; drawn++) {

@@ -146,6 +146,11 @@ struct Box {
       if (each.number < 2 * D) all[static_cast<int>(each.number / 2)] -= each.displacement(at);
     return all;
   }
+  /// The position of the lower face of an axis at a time [length].
+  double lower(int axis, double at) const {
+    const WallOptions<D>* const face = find(2 * static_cast<Id>(axis));
+    return face ? face->displacement(at) : 0.0;
+  }
   double volume() const { return lengths(time).prod(); }
   void set_motion(const WallOptions<D>& options, Wall<D>& wall) const;
 

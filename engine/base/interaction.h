@@ -60,10 +60,23 @@ struct PairFluxes {
   std::array<ExactSum, std::size_t{D} * D>
       stress{};                    ///< Σ d_a F_b over pairs, d and F as in PotentialSums [energy]; index D a + b
   std::array<ExactSum, D> heat{};  ///< ½ Σ [V + d F·] (v_i + v_j) over pairs [energy·length/time]
+  /// The slab in which each particle is, if the stress in slabs is wanted, and Σ ½ d_a F_b of the particles in each.
+  std::span<const std::uint32_t> slab_of{};
+  std::vector<std::array<ExactSum, std::size_t{D} * D>> in_slab{};
 
   void add(const PairFluxes& other) {
     for (std::size_t k = 0; k < stress.size(); ++k) stress[k].add(other.stress[k]);
     for (std::size_t k = 0; k < heat.size(); ++k) heat[k].add(other.heat[k]);
+    in_slab.resize(std::max(in_slab.size(), other.in_slab.size()));
+    for (std::size_t s = 0; s < other.in_slab.size(); ++s)
+      for (std::size_t k = 0; k < stress.size(); ++k) in_slab[s][k].add(other.in_slab[s][k]);
+  }
+  void archive(auto& archive) { archive(stress, heat, in_slab); }
+  /// Adds a particle's part of the stress to its slab.
+  void add_to_slab(std::uint32_t i, double factor, const Eigen::Matrix<double, D, D>& part) {
+    if (slab_of.empty() || slab_of[i] >= in_slab.size()) return;
+    for (int a = 0; a < D; ++a)
+      for (int b = 0; b < D; ++b) in_slab[slab_of[i]][D * a + b].add(factor * part(a, b));
   }
 };
 

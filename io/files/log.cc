@@ -21,7 +21,10 @@ void show(std::FILE* to, std::string_view text) {
 }  // namespace
 
 void RunLog::note(std::string_view text) {
-  file_.append(fmt::format("{:%Y-%m-%d %H:%M:%S}  {}\n", fmt::localtime(std::time(nullptr)), text));
+  const std::tm now = fmt::localtime(std::time(nullptr));
+  const std::string day = fmt::format("{:%Y-%m-%d} ", now);
+  file_.append(fmt::format("{}{:%H:%M:%S}  {}\n", day == day_ ? "" : day, now, text));
+  day_ = day;
 }
 
 void RunLog::say(std::string_view text) {

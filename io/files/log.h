@@ -2,12 +2,14 @@
 #pragma once
 // run.log, and the messages of a run on the terminal.
 //
-// Every line of the log is in the file before the run continues. A log that cannot be written is an error, as for any
-// other file: each member throws Error(Failure::file).
+// Every line begins with the time, and the first line of a day with the date. Every line of the log is in the file
+// before the run continues. A log that cannot be written is an error, as for any other file: each member throws
+// Error(Failure::file).
 
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "io/files/text_file.h"
@@ -31,6 +33,7 @@ class RunLog {
 
  private:
   TextFile file_;
+  std::string day_;  // of the last line, which the next ones need not repeat
   bool quiet_;
 };
 

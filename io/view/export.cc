@@ -76,7 +76,8 @@ void export_page(const ViewOptions& options) {
     stored[prefix + "thermo/0"] = thermo;
     stored[prefix + "particles"] = particles;
     stored[prefix + "bonds"] = bonds;
-    if (const auto rdf = run.answer("rdf")) stored[prefix + "rdf"] = rdf->body;
+    for (const std::string_view name : RunSource::kAverages)
+      if (const auto table = run.answer(name)) stored[prefix + std::string(name)] = table->body;
     state["frames"] = kept;
     state["thermo"] = thermo.size();
     if (state["status"] == "running") state["status"] = "running when exported";

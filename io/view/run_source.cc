@@ -148,14 +148,15 @@ Json RunSource::state() {
   state["frames"] = frames_;
   state["curves"] = curves();
   state["thermo"] = status_of(directory_ / run_file::thermo).size;
-  state["rdf"] = status_of(directory_ / "rdf.csv").version;
+  for (const std::string_view name : kAverages)
+    state["averages"][std::string(name)] = status_of(directory_ / (std::string(name) + ".csv")).version;
   return state;
 }
 
 std::optional<Answer> RunSource::answer(std::string_view question) {
   if (question == "state") return Answer{"application/json", state().dump()};
-  if (question == "rdf") {
-    auto text = read_text(directory_ / "rdf.csv");
+  if (std::ranges::find(kAverages, question) != kAverages.end()) {
+    auto text = read_text(directory_ / (std::string(question) + ".csv"));
     if (!text) return {};
     return Answer{kText, std::move(*text)};
   }

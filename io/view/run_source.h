@@ -10,8 +10,9 @@
 //                 spins [1/time], N numbers of collisions so far
 //   path/I/K      floats: the positions of particle I from frame K on, at most 2000 frames
 //   thermo/B      thermo.csv from its byte B on, complete rows, at most 4 MiB
-//   rdf           rdf.csv
+//   rdf, sk, profile   rdf.csv, sk.csv, profile.csv
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -35,6 +36,9 @@ class RunSource {
 
   /// The answer, or nullopt for an unknown question. Throws Error(Failure::file).
   std::optional<Answer> answer(std::string_view question);
+
+  /// The averages that the page draws.
+  static constexpr std::array<std::string_view, 3> kAverages = {"rdf", "sk", "profile"};
 
   /// The answer to `state`.
   nlohmann::json state();

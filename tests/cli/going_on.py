@@ -12,7 +12,7 @@ from carom_files import toml_text
 from compare import compare, summary_differences
 
 INTERRUPTED = 75
-ALL_OUTPUT = ["output.events=true", "output.rdf_interval=0.07", "output.msd_interval=0.05", "output.profile_interval=0.11",
+ALL_OUTPUT = ["output.events=true", "output.rdf_interval=0.07", "output.msd_interval=0.05", "output.profile_interval=0.11", "output.profile_pressure=true",
               "output.pressure_tensor_interval=0.06"]
 CHECKPOINTS = ["output.checkpoint_wall=\"0\""]  # at every check of the clock
 

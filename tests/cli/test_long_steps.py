@@ -49,7 +49,7 @@ ENDLESS = ["integrator.step=0.5", "placement.packing_fraction=0.906899"]
 
 # Discs joined by springs that are far too stiff for the step, which is halved many times.
 YUKAWA = '"yukawa"\namplitude = 1.0\nkappa = 2.0\ncutoff = 1.9'
-SPRINGS = '"harmonic-bond"\nwithin = 1.5\nstiffness = 1e6\nrest_length = 1.2'
+SPRINGS = '"harmonic-bond"\nwithin = 1.5\nstiffness = 1e6\nrest_length = 1.34'
 STIFF = JAMMED.replace(YUKAWA, SPRINGS).replace("0.9068", "0.5")
 
 

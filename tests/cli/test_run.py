@@ -111,7 +111,7 @@ def test_names_with_commas_and_quotes(tmp_path):
 def test_profile(tmp_path):
     out = tmp_path / "out"
     run(write_deck(tmp_path, SPHERES), out, ["output.profile_interval=0.1", "output.profile_bins=6", "output.profile_axis=2"])
-    assert (out / "profile.csv").read_text().startswith("x,density,temperature,error_density,")
+    assert (out / "profile.csv").read_text().startswith("x,density,temperature,velocity_x,velocity_y,velocity_z,error_density,")
     profile = np.genfromtxt(out / "profile.csv", delimiter=",", names=True)
     edges = [float(e) for e in re.search(r"box = \[(.*)\]", (out / "deck.toml").read_text())[1].split(",")]
     assert profile["x"] == pytest.approx((np.arange(6) + 0.5) * edges[2] / 6)

@@ -21,6 +21,7 @@ import compare
 import movie
 import plot_energy
 import plot_msd
+import plot_profile
 import plot_rdf
 import plot_sk
 import plot_transport
@@ -344,6 +345,21 @@ def test_transport_coefficients_are_drawn_from_the_averages_of_a_run(tmp_path, m
         plot_transport.main([str(tmp_path), "--columns", "viscosity"])
 
 
+def test_profiles_are_drawn_by_quantity_with_one_curve_for_each_species(tmp_path, monkeypatch):
+    (tmp_path / "profile.csv").write_text("x,density,temperature,density_A,density_B,error_density,error_density_A\n"
+                                          "0.5,1,2,0.25,0.75,0.1,0.05\n1.5,3,2,1,2,0.2,0.15\n")
+    drawn, bands = [], []
+    plot = plt.Axes.plot
+    monkeypatch.setattr("matplotlib.axes.Axes.plot", lambda axes, x, y, **kw: drawn.append((kw["label"], y.tolist())) or plot(axes, x, y, **kw))
+    monkeypatch.setattr("matplotlib.axes.Axes.fill_between", lambda axes, x, low, high, **_: bands.append(((high - low) / 2).tolist()))
+    plot_profile.main([str(tmp_path)])
+    assert drawn == [("all", [1, 3]), ("A", [0.25, 1]), ("B", [0.75, 2]), (None, [2, 2])]
+    assert bands == [pytest.approx([0.1, 0.2]), pytest.approx([0.05, 0.15])]
+    assert (tmp_path / "profile.png").stat().st_size > 1000
+    with pytest.raises(SystemExit, match="There is no g in .*profile.csv, only density, temperature, density_A, density_B"):
+        plot_profile.main([str(tmp_path), "--columns", "g"])
+
+
 def test_compare(tmp_path):
     a, b = make_run(tmp_path / "a"), make_run(tmp_path / "b")
     assert compare.compare(a, b) == []
@@ -390,5 +406,5 @@ def test_the_site_has_every_page():
     """tools/docs ends with an error if a page is in no list of the home page; the tutorials make their own."""
     listed = re.findall(r"^(?:\w+ <)?([\w./-]+)>?$", (ROOT / "tools/site/index.md").read_text(), re.MULTILINE)
     pages = subprocess.run(["git", "ls-files", "*.md"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
-    pages = [page for page in pages if not page.startswith(("inputs/tutorials/", "tools/site/"))]
+    pages = [page for page in pages if not page.startswith(("inputs/tutorials/", "tools/site/", ".github/PULL_REQUEST"))]
     assert len(pages) > 10 and [page for page in pages if page.removesuffix(".md") not in listed] == []

@@ -52,8 +52,8 @@ def test_a_run_is_seen_while_it_goes_on(browser, tmp_path):
         assert differing(first, picture(browser, settled=False)) > 0.02, "the spheres stand still"
         assert all(now > before for now, before in zip(curve_ends(browser), ends)), "the curves do not grow"
         assert differing(curve, picture(browser, "#curves canvas", False)) > 0.0005
-        assert browser.execute_script("return charts.rdf.curves[0].x.length > 5 && Math.max(...charts.rdf.curves[0].y) > 1")
-        assert browser.execute_script("return charts.rdf.curves.length") == 1  # without its error
+        assert browser.execute_script("return charts[\"g(r)\"].curves[0].x.length > 5 && Math.max(...charts[\"g(r)\"].curves[0].y) > 1")
+        assert browser.execute_script("return charts[\"g(r)\"].curves.length") == 1  # without its error
 
         # The slider goes back to the first frame, which stays.
         browser.execute_script("element('frame').value = 0; element('frame').dispatchEvent(new Event('input'))")
@@ -131,6 +131,46 @@ def test_discs_in_two_dimensions(browser, tmp_path):
         # The box is 12 by 6 and stands upright: the discs are 2 apart.
         rows = np.flatnonzero(blue.any(axis=1))
         assert abs(len(rows) * 2 - np.diff(columns).mean()) < 0.1 * len(rows) * 2
+
+
+def test_curves_of_two_runs_have_their_names_and_each_average_its_chart(browser, tmp_path):
+    for name in "first", "second":
+        run(write_deck(tmp_path, SPHERES), tmp_path / name, [f"output.{each}_interval=0.1" for each in ("rdf", "sk", "profile")])
+    with page("view", tmp_path / "first", tmp_path / "second", "--no-browser") as (_, port, path):
+        browser.get(f"http://127.0.0.1:{port}{path}")
+        wait_for(browser, "panels.length === 2 && charts['g(r)']?.curves.length === 2 && charts['temperature across the box']?.curves.length === 2")
+        names = browser.execute_script("return Object.entries(charts).map(([title, { curves }]) => [title, curves.map((curve) => curve.name)])")
+        assert {title for title, _ in names} >= {"temperature", "g(r)", "S(k)", "density across the box", "temperature across the box"}
+        assert all(each == ["first", "second"] for _, each in names), names
+
+
+TALL = """
+format = 1
+[system]
+dimension = 2
+box = [8.0, 200.0]
+boundary = ["wall", "wall"]
+[[particles]]
+name = "disc"
+position = [[2.0, 1.0], [6.0, 5.0]]
+velocity = [[1.0, 0.0], [0.0, 1.0]]
+radius = 0.5
+[integrator]
+type = "free-flight"
+step = 0.1
+[run]
+steps = 1
+"""
+
+
+def test_a_pile_in_a_tall_box_is_shown_large(browser, tmp_path):
+    """Two discs near the floor of a box with walls; without walls the whole box is shown."""
+    for boundary, height in ("wall", 3), ("periodic", 100):
+        run(write_deck(tmp_path, TALL.replace('"wall"', f'"{boundary}"')), tmp_path / boundary)
+        with page("view", tmp_path / boundary, "--no-browser") as (_, port, path):
+            browser.get(f"http://127.0.0.1:{port}{path}")
+            wait_for(browser, "camera.fitted")
+            assert browser.execute_script("return camera.home.centre[1]") == pytest.approx(height, abs=2), boundary
 
 
 def test_a_long_table_becomes_a_short_curve(browser, tmp_path):

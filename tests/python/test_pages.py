@@ -2,13 +2,15 @@
 """Pages with code: the blocks are run and must print the output on the page."""
 
 import pathlib
+import re
 import subprocess
 
 import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 TUTORIALS = sorted((ROOT / "inputs" / "tutorials").glob("[0-9]*.md")) + sorted((ROOT / "inputs" / "tutorials" / "python").glob("[0-9]*.md"))
-PAGES = TUTORIALS + [ROOT / "tools" / "site" / "gallery.md"]
+GUIDE = sorted((ROOT / "inputs" / "guide").glob("*.md"))
+PAGES = TUTORIALS + GUIDE + [ROOT / "tools" / "site" / "gallery.md"]
 
 
 def run_page(page):
@@ -19,6 +21,25 @@ def run_page(page):
 def test_a_page_prints_what_it_says(page):
     done = run_page(page)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_guide_has_small_pictures():
+    assert len(GUIDE) > 12 and all("![" in page.read_text() for page in GUIDE)
+    assert max(file.stat().st_size for file in (ROOT / "inputs" / "guide").glob("*.png")) < 60000
+
+
+def test_links_lead_somewhere():
+    """Every link from a page to a file, and to a heading of a page."""
+    def anchors(page):
+        headings = re.findall(r"^#+ (.*)", re.sub(r"^```.*?^```", "", page.read_text(), flags=re.M | re.S), re.M)
+        return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+    pages = [page for folder in ("engine", "inputs", "io", "parallel", "tests", "tools", ".github") for page in (ROOT / folder).rglob("*.md")]
+    lost = [f"{page.relative_to(ROOT)}: {link}" for page in pages + list(ROOT.glob("*.md")) if page.parent.name != "site"
+            for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text()) if not link.startswith("http")
+            for file, _, anchor in [link.partition("#")] for target in [page.parent / file if file else page]
+            if not target.exists() or anchor and anchor not in anchors(target)]
+    assert lost == []
 
 
 def test_another_output_or_a_failing_block_is_noticed(tmp_path):

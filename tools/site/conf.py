@@ -19,7 +19,7 @@ html_copy_source = False
 smartquotes = False
 html_show_sphinx = False
 suppress_warnings = ["myst.header"]
-exclude_patterns = ["**/figures"]
+exclude_patterns = ["**/figures", ".github/PULL_REQUEST_TEMPLATE.md"]
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "show-inheritance": True}
 

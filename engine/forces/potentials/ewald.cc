@@ -66,6 +66,8 @@ class EwaldTerm final : public Interaction<3> {
       throw Error(Failure::deck,
                   "ewald with surface = \"vacuum\" or between walls has no formula for the pressure tensor; use the "
                   "default surface, or no pressure_tensor and no transport");
+    if (!fluxes.slab_of.empty())
+      throw Error(Failure::deck, "ewald has no formula for the pressure in slabs; set profile_pressure = false");
     for (const auto& part : parts_) part->add_fluxes(x, v, fluxes);
     need_inside(x);
     const Amplitudes& s = structure(x);

@@ -16,8 +16,8 @@ carom.Error, and their messages say what to do. `Simulation` and `describe` need
 from carom.errors import CaromWarning, Error, FileError, InitialStateError, NumericalError, UsageError
 from carom.files import Run, open
 
-__all__ = ["CaromWarning", "Error", "FileError", "InitialStateError", "NumericalError", "Run", "Simulation", "UsageError", "describe",
-           "open", "version"]
+__all__ = ["Simulation", "Run", "open", "describe", "version",  # in the order of the reference (tools/site/conf.py)
+           "Error", "UsageError", "InitialStateError", "NumericalError", "FileError", "CaromWarning"]
 
 
 def __getattr__(name):

@@ -3,13 +3,13 @@
 // One camera for all panels: it looks at `centre` from `distance`, turned by the angles `yaw` and `pitch` [rad].
 class Camera {
   constructor() { this.fitted = false; }
-  // Shows the whole box. `aspect`: width over height of the panel. A two-dimensional box is seen from far away, so that discs
-  // stay round.
-  fit(edges, flat, aspect) {
+  // Shows a cuboid from `corner` on, the box or a part of it. `aspect`: width over height of the panel. A two-dimensional box is
+  // seen from far away, so that discs stay round.
+  fit(corner, edges, flat, aspect) {
     const [x, y] = edges, half = flat ? 0.56 * (aspect < 1 ? Math.max(x, y * aspect) : Math.max(y, x / aspect)) : 0.56 * Math.hypot(...edges);
     this.flat = flat;
     this.slope = flat ? 0.02 : 0.365;  // tangent of half the angle of view
-    this.home = { centre: edges.map((edge, k) => (flat && k === 2 ? 0 : edge / 2)), yaw: flat ? 0 : 0.6, pitch: flat ? 0 : -0.35,
+    this.home = { centre: edges.map((edge, k) => (flat && k === 2 ? 0 : corner[k] + edge / 2)), yaw: flat ? 0 : 0.6, pitch: flat ? 0 : -0.35,
                   distance: half / this.slope };
     this.reset();
     this.fitted = true;

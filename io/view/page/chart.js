@@ -88,24 +88,26 @@ class Chart {
     pen.scale(ratio, ratio);
     pen.font = "11px system-ui, sans-serif";
     pen.fillStyle = "#d8dce2";
-    pen.fillText(this.title, 52, 14);
     const [x0, x1, y0, y1] = this.range();
-    if (!isFinite(x0)) return;
-    const [left, right, bottom] = [52, width - 10, height - 24], top = this.legend(pen, left, right);
+    if (!isFinite(x0)) return pen.fillText(this.title, 52, 14);
+    const text = (tick) => (this.log ? `1e${tick}` : String(+tick.toPrecision(4))), ticks = this.ticks(y0, y1);
+    const left = Math.max(52, ...ticks.map((tick) => pen.measureText(text(tick)).width + 8));
+    pen.fillText(this.title, left, 14);
+    const [right, bottom] = [width - 10, height - 24], top = this.legend(pen, left, right);
     const px = (x) => left + ((x - x0) / (x1 - x0)) * (right - left);
     const py = (y) => bottom - ((y - y0) / (y1 - y0)) * (bottom - top);
     pen.strokeStyle = "#2a2e35";
     pen.fillStyle = "#8b93a1";
-    for (const tick of this.ticks(y0, y1)) {
+    for (const tick of ticks) {
       pen.strokeRect(left, py(tick), right - left, 0);
       pen.textAlign = "right";
-      pen.fillText(this.log ? `1e${tick}` : String(+tick.toPrecision(4)), left - 5, py(tick) + 4);
+      pen.fillText(text(tick), left - 5, py(tick) + 4);
     }
     for (const tick of Chart.round(x0, x1)) {
       pen.strokeRect(px(tick), top, 0, bottom - top);
       pen.textAlign = "center";
-      const text = String(+tick.toPrecision(4));
-      pen.fillText(text, Math.min(px(tick), width - 2 - pen.measureText(text).width / 2), bottom + 13);
+      const number = String(+tick.toPrecision(4));
+      pen.fillText(number, Math.min(px(tick), width - 2 - pen.measureText(number).width / 2), bottom + 13);
     }
     pen.textAlign = "right";
     pen.fillText(this.xLabel, right, height - 1);

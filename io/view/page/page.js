@@ -2,7 +2,7 @@
 "use strict";
 // The page: asks for what is new, decides which frame is shown, and draws a panel for each run and the curves of all runs.
 const camera = new Camera();
-const charts = {};        // by name; io/files/thermo.cc declares them, but for g(r)
+const charts = {};        // by name; io/files/thermo.cc declares them, but for averages
 const panels = [];
 let dirty = true;         // something has changed since the last drawing
 let playing = false;
@@ -67,7 +67,7 @@ function drawAll(coarse) {
   const time = panels.find((panel) => panel.frame)?.frame.time;
   element("time").value = `frame ${Math.floor(wanted) + 1} of ${frames()}${time === undefined ? "" : `, t = ${+time.toPrecision(6)}`}`;
   panels.forEach((panel) => panel.draw(coarse));
-  Object.values(charts).forEach((chart) => chart.draw(chart === charts.rdf ? NaN : time));
+  Object.values(charts).forEach((chart) => chart.draw(chart.average ? NaN : time));
 }
 
 // While the camera moves or frames follow each other pictures may be coarse; when they rest, the exact one follows.

@@ -2,6 +2,9 @@
 "use strict";
 // A panel: the picture of one run, what it is, the key to its colours, and the numbers of the sphere that was clicked.
 const COLOURS = ["#f28e2b", "#4e9af1", "#59c16a", "#e15759", "#b07aa1", "#edc948"];
+// The averages that are drawn: title and columns, of which species have their own.
+const AVERAGES = { rdf: [["g(r)", "g"]], sk: [["S(k)", "S"]],
+                   profile: [["density across the box", "density"], ["temperature across the box", "temperature"]] };
 const hex = (colour) => "#" + colour.toString(16).padStart(6, "0");
 
 class Panel {
@@ -18,13 +21,14 @@ class Panel {
     this.path = null;
     steer(this);
   }
-  // Reads what is new: the run's state, rows of thermo, g(r), and once what does not change.
+  // Reads what is new: the run's state, rows of thermo, averages, and once what does not change.
   async update(state) {
     const [old, other] = [this.state, state.id !== this.state.id];
     if (other || state.thermo < this.thermoBytes) this.forget();
     this.state = state;
     if (state.thermo > this.thermoBytes) await this.readThermo();
-    if (state.rdf && (other || state.rdf !== old.rdf)) await this.readRdf();
+    for (const [name, version] of Object.entries(state.averages || {}))
+      if (version && (other || version !== old.averages[name])) await this.readAverages(name);
     if (state.frames && !this.radii) {
       const values = new Float32Array(await source.binary(`${this.number}/particles`)), n = state.particles;
       [this.radii, this.species, this.mass, this.charge] = [0, 1, 2, 3].map((k) => values.subarray(k * n, (k + 1) * n));
@@ -38,9 +42,13 @@ class Panel {
     for (const chart of Object.values(charts)) chart.curves = chart.curves.filter((curve) => curve.panel !== this);
     this.curves = {};
   }
-  curve(chart, name, largest) {
-    const curve = new Curve(name || "", COLOURS[(chart === charts.rdf ? chart.curves.length : this.number) % 6], largest);
+  // A curve is named after the run, or, where averages of one run are drawn, the column.
+  curve(chart, column, largest) {
+    const curve = new Curve("", COLOURS[(chart.average ? chart.curves.length : this.number) % 6], largest);
     curve.panel = this;
+    const own = column === chart.column ? [] : [column];
+    const name = () => (!chart.average ? [this.runName] : panels.length > 1 ? [this.runName, ...own] : [column]);
+    Object.defineProperty(curve, "name", { get: () => name().join(" ") });
     chart.curves.push(curve);
     return curve;
   }
@@ -52,22 +60,27 @@ class Panel {
     for (const { column, chart, title, logarithmic } of this.state.curves || []) {
       if (!columns[column]) continue;
       charts[chart] = charts[chart] || new Chart(element("curves"), title, "time", logarithmic);
-      const curve = this.curves[column] = this.curves[column] || this.curve(charts[chart], "", logarithmic);
-      curve.name = this.state.integrator || "";
+      const curve = this.curves[column] = this.curves[column] || this.curve(charts[chart], column, logarithmic);
       for (let row = 0; row < rows; row++) curve.add(columns.time[row], columns[column][row]);
     }
     dirty = true;
   }
-  async readRdf() {
-    const { names, columns, rows } = readTable(await source.text(`${this.number}/rdf`));
-    charts.rdf = charts.rdf || new Chart(element("curves"), "g(r)", "r");
-    charts.rdf.curves = charts.rdf.curves.filter((curve) => curve.panel !== this);
-    charts.rdf.drawn = null;
-    for (const name of names.filter((each) => each.startsWith("g"))) {  // not their errors
-      const curve = this.curve(charts.rdf, name);
-      for (let row = 0; row < rows; row++) curve.add(columns[names[0]][row], columns[name][row]);
+  async readAverages(table) {
+    const { names, columns, rows } = readTable(await source.text(`${this.number}/${table}`));
+    for (const [title, column] of AVERAGES[table]) {
+      const chart = charts[title] = charts[title] || new Chart(element("curves"), title, names[0]);
+      Object.assign(chart, { average: true, column, drawn: null, curves: chart.curves.filter((curve) => curve.panel !== this) });
+      for (const name of names.filter((each) => each === column || each.startsWith(`${column}_`))) {  // not their errors
+        const curve = this.curve(chart, name);
+        for (let row = 0; row < rows; row++) curve.add(columns[names[0]][row], columns[name][row]);
+      }
     }
     dirty = true;
+  }
+  // What tells this run from the others: its integrator, or its directory where several runs have the same integrator.
+  get runName() {
+    const { integrator, name } = this.state;
+    return panels.some((other) => other !== this && other.state.integrator === integrator) ? (name || "").split("/").at(-1) : integrator || "";
   }
   get flat() { return this.state.dimension === 2; }
   get noun() { return this.flat ? "disc" : "sphere"; }
@@ -75,13 +88,28 @@ class Panel {
     number = Math.min(number, this.state.frames - 1);
     if (number < 0 || number === this.shown || !this.radii) return;
     const frame = readFrame(await source.binary(`${this.number}/frame/${number}`), this.state.particles);
-    if (!camera.fitted) camera.fit(frame.edges, this.flat, this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight));
+    if (!camera.fitted) camera.fit(...this.content(frame), this.flat, this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight));
     Object.assign(this, { frame, shown: number });
     this.spheres.setPositions(frame.position);
     this.spheres.setBox(frame.edges, this.state.boundary, this.flat, this.state.walls.map((wall) => planeOf(wall, frame.time)));
     offerColours();
     this.colour();
     await this.follow();
+  }
+  // The corner and the lengths of what is shown at first: the box, or, along axes that are not periodic and of whose length the spheres
+  // take less than half, the spheres with a radius around them.
+  content(frame) {
+    const corner = [0, 0, 0], lengths = [...frame.edges];
+    for (let axis = 0; axis < (this.flat ? 2 : 3); axis++) {
+      let [low, high] = [Infinity, -Infinity];
+      for (let i = 0; i < this.radii.length; i++) {
+        low = Math.min(low, frame.position[3 * i + axis] - 2 * this.radii[i]);
+        high = Math.max(high, frame.position[3 * i + axis] + 2 * this.radii[i]);
+      }
+      if (this.state.boundary[axis] === "periodic" || !(high > low) || high - low > frame.edges[axis] / 2) continue;
+      [corner[axis], lengths[axis]] = [low, high - low];
+    }
+    return [corner, lengths];
   }
   colour() {
     if (!this.frame) return;

@@ -9,6 +9,7 @@
 #include "engine/base/bath_options.h"
 #include "engine/base/error.h"
 #include "engine/events/thermal_contact.h"
+#include "engine/run/baths.h"
 #include "tests/support/experiments.h"
 
 namespace carom {
@@ -159,6 +160,35 @@ TEST(Baths, KicksArePoissonian) {
   EXPECT_NEAR(squares / kicks, 2 * 0.16, 4 * std::sqrt(20.0) * 0.16 / 100);  // of an exponential distribution
   EXPECT_NE(bath.next_kick(4, 0, 0, 1e9), bath.next_kick(3, 0, 0, 1e9));
   EXPECT_EQ(bath.next_kick(3, 100, 0, 1e9), bath.next_kick(3, 0, 100, 1e9) - 100);
+}
+
+/// The velocity after a kick has the temperature of the ramp at the time of the kick, wherever the slab begins.
+TEST(Baths, AKickHasTheTemperatureOfItsTime) {
+  const Bath ramp{
+      .type = Bath::Type::andersen, .temperature = 1, .last_temperature = 9, .ramp_start = 2, .ramp_end = 6};
+  const Bath constant{.type = Bath::Type::andersen, .temperature = 5, .last_temperature = 5};
+  const Wall<3> rising{.bath = &ramp}, same{.bath = &constant};
+  const Draw draw{.id = 5, .time = 4, .number = 1};
+  EXPECT_EQ(thermal_velocity(rising, 0.5, draw, 0.25), thermal_velocity(same, 0.5, draw, 0.25));
+}
+
+/// A relaxation time far below the slab draws each kinetic energy afresh: its mean and variance are those of the four
+/// degrees of freedom of two discs.
+TEST(Baths, RescalingGivesTwoDiscsTheEnergyOfFourDegreesOfFreedom) {
+  auto system = test::make_system<2>({8, 8}, Boundary::periodic, {{2, 2}, {5, 5}}, {{1, 0}, {-1, 0}});
+  system->box.bath = {.type = Bath::Type::rescaling, .temperature = 3, .last_temperature = 3, .rate = 1000};
+  constexpr int kSlabs = 20000;
+  Counters counters;
+  double sum = 0, squares = 0;
+  for (int slab = 0; slab < kSlabs; ++slab) {
+    rescale(*system, slab, slab + 1.0, 1.0, counters);
+    double kinetic = 0;
+    for (const Vec<2>& v : system->particles.v) kinetic += 0.5 * v.squaredNorm();
+    sum += kinetic / kSlabs;
+    squares += kinetic * kinetic / kSlabs;
+  }
+  EXPECT_NEAR(sum, 2 * 3, 4 * 3 * std::sqrt(2.0 / kSlabs));
+  EXPECT_NEAR(squares - sum * sum, 2 * 9, 4 * 18 * std::sqrt(5.0 / kSlabs));  // of a gamma distribution of shape 2
 }
 
 /// The velocities behind a thermal wall that moves: flux-weighted along the normal, normal along the wall.

@@ -123,6 +123,41 @@ TEST(Blocking, AConstantHasNoError) {
   EXPECT_TRUE(std::isnan(series.estimate(0).error));
 }
 
+/// The error of a ratio of two columns is that of the jackknife over sixteen parts of two samples; the five samples
+/// after these are left out. A mean has its plain standard error.
+TEST(Blocking, FunctionsOfSumsHaveTheErrorOfTheJackknife) {
+  constexpr std::size_t kParts = 16;
+  RandomStream random(1, RandomPurpose::probe, 3);
+  Blocking blocking(2);
+  const auto ratio = [](std::span<const double> sums, double samples) { return sums[0] / (sums[1] + samples); };
+  std::array<std::array<double, 2>, kParts> parts{};
+  for (std::size_t i = 0; i < 2 * kParts + 5; ++i) {
+    const std::array values = {3 + deviate(random), 7 + deviate(random)};
+    blocking.add(values);
+    EXPECT_EQ(std::isnan(blocking.error_of(ratio)), i + 1 < 8);
+    if (i < 2 * kParts)
+      for (const std::size_t k : {0, 1}) parts[i / 2][k] += values[k];
+  }
+  const auto jackknife = [&](auto&& function) {
+    double sum = 0, squares = 0;
+    for (std::size_t left_out = 0; left_out < kParts; ++left_out) {
+      std::array<double, 2> sums{};
+      for (std::size_t part = 0; part < kParts; ++part)
+        for (const std::size_t k : {0, 1}) sums[k] += part == left_out ? 0 : parts[part][k];
+      const double value = function(sums, 2.0 * (kParts - 1));
+      sum += value;
+      squares += value * value;
+    }
+    return std::sqrt((squares - sum * sum / kParts) * (kParts - 1) / kParts);
+  };
+  EXPECT_NEAR(blocking.error_of(ratio), jackknife(ratio), 1e-9);
+
+  Blocking counted(1);
+  for (int i = 0; i < 16; ++i) counted.add(std::array{1.0 * i});
+  const auto mean = [](std::span<const double> sums, double samples) { return sums[0] / samples; };
+  EXPECT_NEAR(counted.error_of(mean), std::sqrt(17.0 / 12), 1e-12);  // the variance of 0 … 15 is 16 · 17/12
+}
+
 TEST(Blocking, ContinuesFromAnArchive) {
   Series series(0.7, 0);
   Blocking whole(3);

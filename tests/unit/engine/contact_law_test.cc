@@ -128,6 +128,21 @@ TEST(DissipativeContacts, TwoSpheresFallTogetherAndStay) {
   }
 }
 
+/// A light disc comes to rest on a heavy one that lies on the floor. Both fall alike, so only the reaction of the floor
+/// presses them together; without it each kick would throw the light disc up again.
+TEST(DissipativeContacts, KicksSustainNoBounceOnWhatLiesOnTheFloor) {
+  for (int k = 0; k < 10; ++k) {
+    auto system = test::make_system<2>({6, 9}, Boundary::wall, {{3, 0.5}, {3, 1.515 + 0.001 * k}}, {{0, 0}, {0, 0}}, {},
+                                       {1e6, 1});
+    test::set_law(*system, {{"restitution", 0.15}, {"rest_speed", 0.02}});
+    add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
+    const auto run = test::run_until<2>(std::move(system), "psa", 0.1, 10);
+    EXPECT_LE(run->statistics().counters.sphere_sphere, 3u) << k;
+    EXPECT_NEAR(run->system().particles.x[1][1], 1.50125, 0.00126) << k;  // a gap up to g h²/4 is held
+    EXPECT_NEAR(run->system().particles.v[1][1], 0, 1e-12) << k;
+  }
+}
+
 /// Discs that touch within a step and are apart again at its end have collided, however little they would overlap.
 TEST(DissipativeContacts, GrazingDiscsCollideWithinAStep) {
   for (const std::string method : {"free-flight", "edda", "cdda", "psa"})

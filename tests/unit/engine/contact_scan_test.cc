@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "engine/base/error.h"
 #include "engine/events/collision.h"
@@ -258,6 +259,75 @@ TEST(ContactScan, RoundingThatHasOpenedOrClosedAContactIsTakenBack) {
     EXPECT_GE(length * (opened[1] - opened[0])[0], -1.01 * gap) << length;
     EXPECT_LE(length * (closed[1] - closed[0])[0], 1.01 * gap) << length;
   }
+}
+
+/// A column of discs of masses 2, 2, 4: the floor holds 0, which holds 1, and 2 comes down on 1 at the acceleration of
+/// 1. The forces alone do not press 2 on 1; the reaction that holds 1 does.
+struct Column {
+  explicit Column(const Parameters& law, const std::vector<Vec<2>>& accelerations = {{0, -1}, {0, -3}, {0, -3}})
+      : system(test::make_system<2>({20, 9}, Boundary::wall, {{3, 1}, {3, 3}, {3, 5}},
+                                    std::vector<Vec<2>>(3, Vec<2>::Zero()), {1, 1, 1}, {2, 2, 4})),
+        a(accelerations),
+        reactions(
+            {{{.kind = EventKind::pair, .lo = 0, .hi = 1}, 2}, {{.kind = EventKind::wall, .lo = 0, .hi = 2}, 6}}) {
+    test::set_law(*system, law);
+    criterion.emplace(system->box, system->particles, reactions);
+  }
+  double stopping(Id lo, Id hi, EventKind kind, double kick, double force = 0) {
+    criterion->stop_within(kick);
+    criterion->begin_step(&a, 0.1);
+    const EventKey<2> key{.kind = kind, .lo = lo, .hi = hi};
+    return criterion->stopping_speed(key, contact_normal<2>(system->box, key, system->particles.x), force, 0);
+  }
+  double gap(double length) {
+    criterion->begin_step(&a, length);
+    return criterion->holding_gap({.lo = 1, .hi = 2}, {0, -2}, 0);
+  }
+  std::unique_ptr<System<2>> system;
+  std::vector<Vec<2>> a;
+  std::vector<Reaction<2>> reactions;
+  std::optional<RestCriterion<2>> criterion;
+};
+
+TEST(RestCriterion, ReactionsPressWhatComesDownOnThoseTheyHold) {
+  // With kicks in a time k an approach stops below 0.01 + k·pressing/(1 − e); pressing is an acceleration.
+  Column column({{"restitution", 0.5}, {"rest_speed", 0.01}});
+  const auto pressing = [&](Id lo, Id hi, EventKind kind, double force = 0) {
+    return (column.stopping(lo, hi, kind, 0.1, force) - 0.01) / 0.2;
+  };
+  EXPECT_NEAR(pressing(1, 2, EventKind::pair), 1, 1e-14);       // 0 holds 1 with 2/2, and both fall at 3
+  EXPECT_NEAR(pressing(1, 2, EventKind::pair, 6), 4.5, 1e-14);  // its own reaction: 6/2 + 6/4
+  EXPECT_NEAR(pressing(0, 1, EventKind::pair), 3, 1e-14);       // 0 rises at 6/2 − 2/2 − 1, 1 at 2/2 − 3
+  EXPECT_NEAR(pressing(0, 2, EventKind::wall), 1, 1e-14);       // by forces; reactions lift it
+  column.reactions.clear();
+  EXPECT_EQ(pressing(1, 2, EventKind::pair), 0);
+  EXPECT_NEAR(pressing(0, 2, EventKind::wall), 1, 1e-14);
+}
+
+TEST(RestCriterion, ApproachesStopThatKicksCannotSustain) {
+  const auto stopping = [](double e, double kick) {
+    return Column({{"restitution", e}, {"rest_speed", 0.01}}).stopping(1, 2, EventKind::pair, kick);
+  };
+  EXPECT_EQ(stopping(0.5, 0), 0.01);
+  EXPECT_NEAR(stopping(0.5, 0.1), 0.01 + 0.1 / 0.5, 1e-15);
+  EXPECT_NEAR(stopping(0.9, 0.1), 0.01 + 0.1 / 0.1, 1e-14);
+  EXPECT_NEAR(stopping(0.999, 0.1), 0.01 + 0.1 * kMostBounces, 1e-14);
+  EXPECT_NEAR(stopping(0.5, 0.001), 0.01 + 0.001, 1e-15);  // below the rest speed e is 0
+  // Nothing presses 2 on 1 if it falls more slowly than 1 is held.
+  Column leaving({{"restitution", 0.5}, {"rest_speed", 0.01}}, {{0, -1}, {0, -3}, {0, 0}});
+  EXPECT_EQ(leaving.stopping(1, 2, EventKind::pair, 0.1), 0.01);
+}
+
+TEST(RestCriterion, GapsAreHeldThatASlowBounceOpens) {
+  Column column({{"restitution", 0.5}, {"rest_speed", 0.01}});
+  EXPECT_NEAR(column.gap(0.1), 0.01 * 0.01 / (2 * kMostBounces), 1e-18);
+  EXPECT_NEAR(column.gap(0.001), 0.0005 * 0.0005 / (2 * kMostBounces), 1e-18);  // half of pressing · length
+  EXPECT_NEAR(column.criterion->widest_gap(), 0.01 * 0.001 / kMostBounces, 1e-18);
+  column.criterion->stop_within(0.1);
+  column.criterion->begin_step(&column.a, 0.2);
+  EXPECT_NEAR(column.criterion->widest_gap(), 3 * 0.2 * 0.2 / 4, 1e-15);  // h²/8 of twice the largest acceleration
+  column.reactions.clear();
+  EXPECT_EQ(column.gap(0.1), 0);  // nothing presses
 }
 
 TEST(ContactScan, LimitsTheEventsOfASlab) {

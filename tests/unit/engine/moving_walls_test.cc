@@ -95,6 +95,40 @@ TEST(ShakenContact, IsTheFirst) {
   EXPECT_GT(found, 50);
 }
 
+/// A sphere at the wall that moves with it, or leaves it slowly, against steps of 10⁻⁵: pressed on, it touches at once;
+/// otherwise it lifts off, and the next contact is found however soon it comes.
+TEST(ShakenContact, IsTheFirstOfASphereThatTouches) {
+  constexpr double kAmplitude = 0.3, kFrequency = 1.1, kOmega = 2 * std::numbers::pi * kFrequency, kRest = 1.5;
+  int pressed = 0, soon = 0, later = 0;
+  for (int k = 0; k < 120; ++k) {
+    const double turns = (k % 40 + 0.5) / 40, departing = k % 3 == 0 ? 0.05 : 0;
+    const double sine = kAmplitude * std::sin(2 * std::numbers::pi * turns);
+    const ShakenGap gap{.y = sine,
+                        .v = kOmega * kAmplitude * std::cos(2 * std::numbers::pi * turns) + departing,
+                        .a = 4.0 * (k / 40) - 5,
+                        .amplitude = kAmplitude,
+                        .frequency = kFrequency,
+                        .turns = turns};
+    const double first = gap.first_contact(kRest, true, 1e-9);
+    if (departing == 0 && gap.a + kOmega * kOmega * sine <= 0) {
+      ++pressed;
+      EXPECT_EQ(first, 0) << k;
+      continue;
+    }
+    double tried = 1e-5;
+    while (tried < kRest && !(gap.at(tried) <= 0 && gap.slope(tried) < 0)) tried += 1e-5;
+    if (tried >= kRest) {
+      EXPECT_GE(first, kRest - 2e-5) << k;
+      continue;
+    }
+    ++(tried < 0.1 ? soon : later);
+    EXPECT_NEAR(first, tried, 2e-5) << k;
+  }
+  EXPECT_GT(pressed, 20);
+  EXPECT_GT(soon, 3);
+  EXPECT_GT(later, 20);
+}
+
 /// A disc bounces on a shaken floor: each contact is at the floor, and the work is the energy gained.
 TEST(ShakenWalls, WorkIsTheEnergyGained) {
   constexpr double kAmplitude = 0.2, kFrequency = 1.5;

@@ -102,15 +102,15 @@ void expect(const std::string& name, const Hash& hash) {
       {"free-flight, laws, ledger", 0x76200ac856674593},
       {"free-flight, laws, 2-D", 0xf5ec03a1817f6c7b},
       {"psa, laws, ledger", 0xf78ef86aac679420},
-      {"psa, laws, 2-D", 0x729fac61c379f5ca},
+      {"psa, laws, 2-D", 0x60e71070a494a4b0},
       {"cva, laws, ledger", 0xf7480ab520ae9260},
-      {"cva, laws, 2-D", 0x486df6092768a813},
+      {"cva, laws, 2-D", 0x5464baa4b5afc5db},
       {"mcva, laws, ledger", 0xf7480ab520ae9260},
-      {"mcva, laws, 2-D", 0x486df6092768a813},
+      {"mcva, laws, 2-D", 0x5464baa4b5afc5db},
       {"cdda, laws, ledger", 0x19d08d150ecbcd05},
-      {"cdda, laws, 2-D", 0x32b1ecf7bdeb52b6},
+      {"cdda, laws, 2-D", 0xe12bbb3447746851},
       {"edda, laws, ledger", 0x6608377546e5c369},
-      {"edda, laws, 2-D", 0x59801f84f5266550},
+      {"edda, laws, 2-D", 0x398b993a29dab79},
   };
   const auto found = stored.find(name);
   EXPECT_TRUE(found != stored.end() && found->second == hash.word)

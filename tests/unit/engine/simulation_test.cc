@@ -120,6 +120,43 @@ TEST(Simulation, MeasuresTheMeanFreeFlight) {
   EXPECT_FALSE(none->statistics().mean_free_path);
 }
 
+/// The means of the samples with their errors are those of the whole run, and those of the rows of all steps.
+TEST(Simulation, TheMeansOfTheSeriesAreThoseOfTheRun) {
+  const auto column = [](const Statistics& s, std::string_view name) {
+    return s.estimate(std::ranges::find(Statistics::mean_names, name) - Statistics::mean_names.begin()).mean;
+  };
+  auto gas = test::hard_spheres<3>(3, 0.2);
+  const auto flight = test::run_until<3>(std::move(gas), "free-flight", 0.5, 20);
+  const Statistics& s = flight->statistics();
+  EXPECT_GT(s.counters.sphere_sphere, 1000u);
+  EXPECT_NEAR(column(s, "pressure"), s.mean_pressure, 1e-12 * s.mean_pressure);
+  EXPECT_NEAR(column(s, "collision_rate"), s.collision_rate, 1e-12 * s.collision_rate);
+  EXPECT_NEAR(column(s, "mean_free_time"), *s.mean_free_time, 1e-12);
+  EXPECT_NEAR(column(s, "mean_free_path"), *s.mean_free_path, 1e-12);
+
+  struct Rows : Observer<2> {
+    void thermo(const Snapshot<2>& shot) override {
+      if (shot.step == 0) return;
+      temperature += shot.temperature / 400;
+      potential += shot.potential / 400;
+    }
+    double temperature = 0, potential = 0;
+  } rows;
+  auto springs = test::make_run<2>(test::five_springs(), "psa", {.step = 0.01, .steps = 400, .thermo_interval = 1e-3});
+  springs->add(rows);
+  springs->run();
+  const Statistics& of_steps = springs->statistics();
+  EXPECT_NEAR(column(of_steps, "temperature"), rows.temperature, 1e-12 * rows.temperature);
+  EXPECT_NEAR(column(of_steps, "potential"), rows.potential, 1e-12 * rows.potential);
+  std::size_t hit = 0;
+  for (std::size_t wall = 0; wall < of_steps.counters.walls.size(); ++wall) {
+    const double impulse = of_steps.counters.walls[wall].impulse.value();
+    hit += impulse != 0;
+    EXPECT_NEAR(of_steps.estimate(Statistics::mean_names.size() + wall).mean, impulse / of_steps.end_time, 1e-12);
+  }
+  EXPECT_GE(hit, 1u);
+}
+
 /// Two discs as above, in a run that branches off at step 30, which is at another time than 30 steps of its own: sums
 /// and means begin there.
 TEST(Simulation, ABranchCountsFromItsStart) {

@@ -88,6 +88,19 @@ TEST(PressureTensor, OfAColumnBetweenWallsIsNotThatOfItsRows) {
   EXPECT_EQ(p[3], 0);
 }
 
+/// The discs above are back after a time of 4 each: samples from time 2 on, and the time before them does not count.
+TEST(PressureTensor, TimeBeginsAtTheFirstSample) {
+  auto run = test::make_run<2>(test::make_system<2>({6, 4}, Boundary::wall, {{1, 2}, {5, 2}}, {{1, 0}, {-1, 0}}),
+                               "free-flight", {.step = 10, .end_time = 15});
+  const auto observable = make_observable("pressure_tensor", run->system(), {{"interval", 4.0}}, 2);
+  run->add(*observable);
+  run->run();
+  EXPECT_EQ(observable->samples(), 4u);
+  const auto table = columns(*observable);
+  EXPECT_NEAR(table.at("kinetic")[0], 2.0 / 24, 1e-13);
+  EXPECT_NEAR(table.at("collisions")[0], 2.0 / 4 / 24, 1e-13);
+}
+
 TEST(PressureTensor, TraceIsThePressureUnderForces) {
   const auto trace = [](const std::string& type, const Parameters& given, bool charged, double* pressure) {
     auto system = test::hard_spheres<3>(3, 0.2);
