@@ -45,6 +45,7 @@ def made(tmp_path, monkeypatch):
     monkeypatch.setenv("CAROM_PIP_BUILD", str(tmp_path))
     monkeypatch.setattr(build_backend, "run", lambda *command: calls.append([str(part) for part in command]) or (
         command[1] == "--install" and os.makedirs(f"{command[4]}/lib/python3.11/site-packages/carom")))
+
     def make():
         return zipfile.ZipFile(tmp_path / build_backend.build_wheel(tmp_path)), calls[0]
     return make
