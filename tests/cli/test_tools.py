@@ -405,6 +405,7 @@ def test_decks_survive_being_written():
 def test_the_site_has_every_page():
     """tools/docs ends with an error if a page is in no list of the home page; the tutorials make their own."""
     listed = re.findall(r"^(?:\w+ <)?([\w./-]+)>?$", (ROOT / "tools/site/index.md").read_text(), re.MULTILINE)
+    listed += [f"inputs/guide/{page}" for page in re.findall(r"\]\(([a-z-]+)\.md\)", (ROOT / "inputs/guide/README.md").read_text())]
     pages = subprocess.run(["git", "ls-files", "*.md"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
     pages = [page for page in pages if not page.startswith(("inputs/tutorials/", "tools/site/", ".github/PULL_REQUEST"))]
     assert len(pages) > 10 and [page for page in pages if page.removesuffix(".md") not in listed] == []
