@@ -41,7 +41,7 @@ class Profile : public Observable<D> {
   bool divided() const override { return true; }
   bool needs_contacts() const override { return pressure_; }
   void contacts(double slab_start, std::span<const Contact<D>> contacts) override {
-    if (this->samples() == 0) return;
+    if (!pressure_ || this->samples() == 0) return;
     for (const Contact<D>& each : contacts) {
       if (each.key.kind != EventKind::pair) continue;
       const Tensor<D> half = 0.5 * (each.x_lo - each.x_hi) * each.impulse.transpose();
