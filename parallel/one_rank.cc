@@ -13,11 +13,14 @@ std::unique_ptr<Team> start_team(double) {
   for (const std::string name : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"})
     if (const char* const size = std::getenv(name.c_str()); size != nullptr && std::atoi(size) > 1)
       throw Error(Failure::deck,
-                  "this is one of " + std::string(size) + " processes (" + name +
-                      "), each of which would do the same, since this carom has no MPI; start it without mpirun, or "
-                      "install one with MPI: CMAKE_ARGS=-DCAROM_PORTABLE=OFF pip install ./io/python; if each process "
-                      "has a deck of its own, unset " +
-                      name);
+                  std::string("this is one of ")
+                      .append(size)
+                      .append(" processes (")
+                      .append(name)
+                      .append("), each of which would do the same, since this carom has no MPI; start it without "
+                              "mpirun, or install one with MPI: CMAKE_ARGS=-DCAROM_PORTABLE=OFF pip install "
+                              "./io/python; if each process has a deck of its own, unset ")
+                      .append(name));
   return nullptr;
 }
 

@@ -31,8 +31,8 @@ install_packages() {
   if [ -z "$missing" ]; then return; fi
   if [ "$(id -u)" != 0 ]; then
     if ! sudo -n true 2>/dev/null; then
-      echo "Carom needs packages that only root can install. Run this, then call again:" >&2
-      echo "  su -c 'apt-get update && apt-get install --yes --no-install-recommends ${missing% }'" >&2
+      echo "Carom needs packages that only root can install. Run one of these, then call again:" >&2
+      printf "  %s 'apt-get update && apt-get install --yes --no-install-recommends ${missing% }'\n" 'sudo sh -c' 'su -c' >&2
       exit 1
     fi
     as_root=(sudo -n)
