@@ -71,6 +71,28 @@ TEST(Calendar, TakesVeryUnevenTimes) {  // bins adapt; some entries have equal t
   EXPECT_EQ(served, scheduled);
 }
 
+TEST(Calendar, KnowsWhatComesNextWithinABin) {
+  Calendar calendar;
+  calendar.reset(1.0, 1000);
+  for (std::uint32_t k = 0; k < 1000; ++k) calendar.push(((k * 617) % 1000) / 1000.0, k);
+  std::size_t served = 0, most = 0;
+  while (calendar.top(always)) {
+    std::vector<std::uint32_t> coming;
+    while (const CalendarEntry* entry = calendar.upcoming(coming.size())) coming.push_back(entry->slot);
+    ASSERT_FALSE(coming.empty());
+    ASSERT_LE(served + coming.size(), 1000u);
+    most = std::max(most, coming.size());
+    for (const std::uint32_t slot : coming) {
+      ASSERT_EQ(std::uint32_t{calendar.top(always)->slot}, slot);
+      calendar.pop();
+      ++served;
+    }
+    ASSERT_EQ(calendar.upcoming(0), nullptr);
+  }
+  EXPECT_EQ(served, 1000u);
+  EXPECT_GT(most, 3u);
+}
+
 TEST(Calendar, StartsAfresh) {
   Calendar calendar;
   calendar.reset(1.0, 4);

@@ -389,5 +389,17 @@ TEST(EventCore, MoreEventsThanAllowedIsAnErrorThatNamesThePair) {
   EXPECT_THROW(core.run(100, {.counters = counters, .max_events = 10}), Error);
 }
 
+TEST(EventCore, CountsWhatItDid) {
+  const auto run = test::run_until<3>(test::hard_spheres<3>(4, 0.4), "free-flight", 1, 4);
+  const Counters& all = run->statistics().counters;
+  const EventCounts& events = all.events;
+  EXPECT_GT(events.predictions, all.sphere_sphere);
+  EXPECT_GT(events.candidates, events.predictions);
+  EXPECT_GT(events.stale, 0u);
+  EXPECT_GT(events.dropped, 0u);
+  EXPECT_GT(events.scheduled, events.dropped + all.sphere_sphere);
+  EXPECT_GT(events.crossings + events.rebuilds, 0u);
+}
+
 }  // namespace
 }  // namespace carom

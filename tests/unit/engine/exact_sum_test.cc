@@ -84,6 +84,22 @@ TEST(ExactSum, CancelsCompletely) {
   EXPECT_EQ(sum_of({}), 0.0);
 }
 
+TEST(ExactSum, TakesIntegersOf128Bits) {
+  __extension__ using Whole = __int128;
+  const Whole large = (Whole{0x0123456789abcdef} << 64) + 0x7edcba9876543211;
+  for (const Whole whole : {large, -large, Whole{1}, Whole{-1}, (Whole{1} << 52) + 1, -(Whole{1} << 96)}) {
+    ExactSum sum;
+    sum.add(whole, 0x1p-60);
+    // In parts of 32 bits, from above.
+    for (int k = 3; k >= 0; --k) {
+      const auto part = static_cast<double>(static_cast<std::int64_t>(whole >> 32 * k) &
+                                            (k == 3 ? ~std::int64_t{0} : std::int64_t{0xffffffff}));
+      sum.add(-std::ldexp(part, 32 * k - 60));
+    }
+    EXPECT_EQ(sum.value(), 0);
+  }
+}
+
 TEST(ExactSum, HoldsTheExtremes) {
   const double tiny = std::numeric_limits<double>::denorm_min(), huge = std::numeric_limits<double>::max();
   EXPECT_EQ(sum_of({tiny, tiny}), 2 * tiny);

@@ -139,6 +139,23 @@ TEST(RadialDistribution, TheContactValueIsThatAtTheContactDistanceOfTwoSpecies) 
   }
 }
 
+/// A parabola needs a fourth shell with pairs among the first six.
+TEST(RadialDistribution, HasAContactValueFromFourShellsOn) {
+  for (const int shells : {3, 4}) {
+    std::vector<Vec<3>> x;
+    for (int k = 0; k < shells; ++k) {
+      const double y = 3 * k + 2.0;
+      x.push_back({2, y, 2});
+      x.push_back({3.025 + 0.05 * k, y, 2});
+    }
+    const auto system = test::make_system<3>(Vec<3>::Constant(15), Boundary::periodic, x,
+                                             std::vector<Vec<3>>(x.size(), Vec<3>::Zero()));
+    RadialDistribution<3> rdf(*system, {.sampling = {}, .range = 2, .bins = 40});
+    rdf.sample(0, system->particles);
+    EXPECT_EQ(rdf.contact_value(0, 0).has_value(), shells == 4);
+  }
+}
+
 /// g averaged over many samples of an ideal gas: 1 at every r, also along walls.
 template <int D>
 void expect_ideal_gas(const Vec<D>& edges, std::array<Boundary, D> boundary, double range) {

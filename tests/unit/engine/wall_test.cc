@@ -84,5 +84,21 @@ TEST(ContactTally, AddsUpWhatItsPartsCount) {
   EXPECT_EQ(partners(log[1].key, Box<2>{}), "particle 1 and the upper wall of axis 1");
 }
 
+/// A face that moves or is warm is still one wall; a further wall is one, or two if it acts on both sides.
+TEST(Walls, EachIsThereOnce) {
+  Box<2> box{.edges = {8, 8}, .boundary = {W, P}};
+  const auto numbers = [&] {
+    std::vector<Id> all;
+    for (const Wall<2>& wall : box.walls()) all.push_back(wall.number);
+    return all;
+  };
+  EXPECT_EQ(numbers(), (std::vector<Id>{0, 1}));
+  box.add({.name = "x-", .temperature = 2});
+  EXPECT_EQ(numbers(), (std::vector<Id>{0, 1}));
+  box.add({.name = "floor", .normal = {0, 1}, .offset = 1});
+  box.add({.name = "middle", .normal = {1, 0}, .offset = 6, .one_sided = false});
+  EXPECT_EQ(numbers(), (std::vector<Id>{0, 1, 4, 5, 6}));
+}
+
 }  // namespace
 }  // namespace carom
