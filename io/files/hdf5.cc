@@ -77,8 +77,8 @@ File File::writable(const std::filesystem::path& path, const char* action,
                     hid_t (*open)(const char* path, hid_t access)) {
   start_library();
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-  H5Pset_driver(access.id(), journal_driver(), nullptr);
-  const hid_t id = open(path.c_str(), access.id());
+  const bool with_journal = H5Pset_driver(access.id(), journal_driver(), nullptr) >= 0;
+  const hid_t id = with_journal ? open(path.c_str(), access.id()) : H5I_INVALID_HID;
   if (id < 0) throw_write_error(path, action, reason());
   return {path, id, true};
 }
