@@ -66,7 +66,7 @@ class MpiTeam : public Team {
     MPI_Comm_free(&world_);
     MPI_Finalize();
   }
-  Communicator& communicator() override { return communicator_->size() > 1 ? *communicator_ : alone_; }
+  Communicator& communicator() override { return *communicator_; }
   int finish(const Outcome& mine, bool alone) override { return watch_->finish(mine, alone); }
 
  private:
@@ -74,7 +74,6 @@ class MpiTeam : public Team {
   double silence_;
   std::optional<Watch> watch_;
   std::optional<MpiCommunicator> communicator_;
-  Communicator alone_;
 };
 
 }  // namespace

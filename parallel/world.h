@@ -60,7 +60,9 @@ class World {
 
   int rank() const { return communicator().rank(); }
   int size() const { return communicator().size(); }
-  Communicator& communicator() const { return team_ ? team_->communicator() : alone_; }
+  Communicator& communicator() const {
+    return team_ && team_->communicator().size() > 1 ? team_->communicator() : alone_;
+  }
 
   /// Runs `work` on all ranks, which may communicate in it. Returns the exit code of all: the value of `work`, or the
   /// code of the first failure. Exceptions are reported on stderr, once if all ranks meet the same Error, otherwise

@@ -177,12 +177,12 @@ struct Box {
   /// Brings a position back into [0, edge) along the periodic axes and counts the crossings in `image`. Throws
   /// Error(failure) if the number of crossings does not fit into `image`. Positions that are not finite stay.
   void wrap(Vec<D>& x, Image<D>& image, Failure failure = Failure::numerical) const {
-    constexpr double kMost = std::numeric_limits<std::int32_t>::max();
+    constexpr double kMostCrossings = std::numeric_limits<std::int32_t>::max();
     for (int k = 0; k < D; ++k) {
       if (!periodic(k) || (x[k] >= 0 && x[k] < edges[k])) continue;
       const double crossings = std::floor(x[k] / edges[k]);
       if (crossings == 0 || !std::isfinite(crossings)) continue;
-      if (!(std::abs(image[k] + crossings) < kMost))
+      if (!(std::abs(image[k] + crossings) < kMostCrossings))
         throw Error(failure,
                     "a particle has crossed the periodic box " + short_text(std::abs(image[k] + crossings)) +
                         " times along axis " + std::to_string(k) +

@@ -46,7 +46,7 @@ class Profile : public Observable<D> {
       if (each.key.kind != EventKind::pair) continue;
       const Tensor<D> half = 0.5 * (each.x_lo - each.x_hi) * each.impulse.transpose();
       for (const Vec<D>& x : {each.x_lo, each.x_hi})
-        if (const std::size_t s = slab_of(x, slab_start + each.key.time); s < bins_) collisions_[s] += half;
+        if (const std::size_t s = slab_of(x, faces(slab_start + each.key.time)); s < bins_) collisions_[s] += half;
     }
   }
 
@@ -54,8 +54,8 @@ class Profile : public Observable<D> {
     std::vector<TableColumn> table = {{"x", {}}};
     const auto samples = static_cast<double>(this->samples());
     for (std::size_t s = 0; s < bins_; ++s)
-      table[0].values.push_back((faces_[0] + (static_cast<double>(s) + 0.5) / static_cast<double>(bins_) * faces_[1]) /
-                                samples);
+      table[0].values.push_back(
+          (faces_.lower + (static_cast<double>(s) + 0.5) / static_cast<double>(bins_) * faces_.length) / samples);
     for (std::size_t c = 0; c < names_.size(); ++c) {
       std::vector<double> means;
       std::vector<Estimate> estimates;
@@ -70,14 +70,18 @@ class Profile : public Observable<D> {
 
  private:
   static constexpr std::array kAxes = {'x', 'y', 'z'};
+  /// Where the lower face is, and the distance of the upper one from it [length].
+  struct Faces {
+    double lower = 0, length = 0;
+  };
 
   /// The number of species, each of which has a density and a temperature of its own; 0 if there is only one.
   std::size_t parts() const { return system_.species.size() > 1 ? system_.species.size() : 0; }
-  /// The slab of a position at a time; bins_ where the axis is open and the position beyond the box.
-  std::size_t slab_of(Vec<D> x, double time) const {
-    Image<D> image{};
-    system_.box.wrap(x, image);
-    const double at = (x[axis_] - system_.box.lower(axis_, time)) / system_.box.lengths(time)[axis_];
+  Faces faces(double time) const { return {system_.box.lower(axis_, time), system_.box.lengths(time)[axis_]}; }
+  /// The slab of a position; bins_ where the axis is open and the position beyond the box.
+  std::size_t slab_of(const Vec<D>& x, const Faces& between) const {
+    double at = (x[axis_] - between.lower) / between.length;
+    if (system_.box.periodic(axis_)) at -= std::floor(at);
     if (system_.box.boundary[axis_] == Boundary::open && !(at >= 0 && at < 1)) return bins_;
     const auto all = static_cast<double>(bins_);
     return static_cast<std::size_t>(std::clamp(at * all, 0.0, all - 1));
@@ -92,8 +96,9 @@ class Profile : public Observable<D> {
       values[column * bins_ + slab] += value;
       weights[column * bins_ + slab] += weight;
     };
+    const Faces now = faces(time);
     for (const Traveller<D>& each : all) {
-      const std::size_t s = slab_of(each.x, time);
+      const std::size_t s = slab_of(each.x, now);
       if (s == bins_) continue;
       add(0, s, 1, 0);
       if (parts() > 0) add(2 + D + each.species, s, 1, 0);
@@ -104,8 +109,7 @@ class Profile : public Observable<D> {
       if (parts() > 0) add(2 + D + parts() + each.species, s, twice_kinetic, D);
       if (pressure_) flux[s] += each.mass * each.v * each.v.transpose();
     }
-    const Vec<D> lengths = system_.box.lengths(time);
-    const double volume = lengths.prod() / static_cast<double>(bins_), elapsed = time - before_;
+    const double volume = system_.box.lengths(time).prod() / static_cast<double>(bins_), elapsed = time - before_;
     for (std::size_t s = 0; s < bins_; ++s) {
       add(0, s, 0, volume);
       for (std::size_t k = 0; k < parts(); ++k) add(2 + D + k, s, 0, volume);
@@ -116,7 +120,8 @@ class Profile : public Observable<D> {
         for (int b = a; b < D; ++b) add(column++, s, 0.5 * (sum(a, b) + sum(b, a)), elapsed * volume);
     }
     series_.add(values, weights);
-    faces_ += Eigen::Array2d(system_.box.lower(axis_, time), lengths[axis_]);
+    faces_.lower += now.lower;
+    faces_.length += now.length;
     before_ = time;
   }
   /// Σ ½ d F of the particles in each slab, on rank 0. Collective.
@@ -124,7 +129,7 @@ class Profile : public Observable<D> {
     std::vector<Tensor<D>> sums(pressure_ ? bins_ : 0, Tensor<D>::Zero());
     if (!pressure_ || system_.interactions.empty()) return sums;
     std::vector<std::uint32_t> slabs;
-    for (const Vec<D>& x : particles.x) slabs.push_back(static_cast<std::uint32_t>(slab_of(x, time)));
+    for (const Vec<D>& x : particles.x) slabs.push_back(static_cast<std::uint32_t>(slab_of(x, faces(time))));
     const std::vector<Vec<D>> v(particles.size(), Vec<D>::Zero());
     PairFluxes<D> own;
     own.slab_of = slabs;
@@ -143,9 +148,8 @@ class Profile : public Observable<D> {
   int axis_;
   std::size_t bins_;
   bool pressure_;
-  std::vector<std::string> names_;  // of the columns
-  Eigen::Array2d faces_ =
-      Eigen::Array2d::Zero();          // the lower face and the length between the faces, summed over samples
+  std::vector<std::string> names_;     // of the columns
+  Faces faces_;                        // summed over samples
   double before_ = 0;                  // the last sample
   std::vector<Tensor<D>> collisions_;  // Σ ½ d J in each slab since then
   Blocking series_;                    // [column][slab]
@@ -193,8 +197,8 @@ ObservableInfo profile() {
           "temperature 2K/(D n) of the n particles in the slab, their mean velocity is not subtracted; velocity_x, …: "
           "momentum over mass; with several species density_A and temperature_A of each; with pressure = true "
           "pressure_xx, pressure_xy, …: (sum m v v + sum d F/2 + sum d J/(2 t))/V over the particles of the slab and "
-          "their partners, as in pressure_tensor.csv, of which it is the mean over slabs, without long-range "
-          "corrections (the stress is its negative); error_ and samples_ of all.",
+          "their partners, as in pressure_tensor.csv, of whose symmetric part it is the mean over slabs, without "
+          "long-range corrections (the stress is its negative); error_ and samples_ of all.",
       .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.12",
       .in_2d = maker<Profile, 2>(complete_profile<2>),
       .in_3d = maker<Profile, 3>(complete_profile<3>)};

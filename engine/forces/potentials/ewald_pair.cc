@@ -23,7 +23,7 @@ EwaldPair::EwaldPair(double constant, double alpha, double end, double error)
       const auto next = static_cast<double>(m + 1);
       term *= 0.25 * h * h / (next * (next + static_cast<double>(n)));
     }
-    if (n < kMost) term_[n] = taylor * j[n];
+    if (n < kMostTerms) term_[n] = taylor * j[n];
     const auto next = static_cast<double>(n + 1);
     first *= -0.5 * h / next;
     taylor *= -h / next;
@@ -33,7 +33,7 @@ EwaldPair::EwaldPair(double constant, double alpha, double end, double error)
   for (degree_ = terms - 1; degree_ > 1; --degree_) {
     const auto n = static_cast<double>(degree_);
     left_out += std::abs(chebyshev[degree_]) * n * n / h;
-    if (left_out > error && degree_ < kMost) break;
+    if (left_out > error && degree_ < kMostTerms) break;
   }
   std::vector<double> before(terms + 1), last(terms + 1), next(terms + 1);  // coefficients of T_{n−1}, T_n, T_{n+1}
   before[0] = last[1] = 1;
@@ -49,7 +49,7 @@ EwaldPair::EwaldPair(double constant, double alpha, double end, double error)
     if (n > 0) first_[n - 1] = slope_ * k * term_[n];
     if (n > 1) second_[n - 2] = slope_ * (k - 1) * first_[n - 1];
   }
-  for (std::size_t n = degree_ + 1; n < kMost; ++n) term_[n] = 0;
+  for (std::size_t n = degree_ + 1; n < kMostTerms; ++n) term_[n] = 0;
 }
 
 }  // namespace carom

@@ -63,8 +63,8 @@ class EwaldPair {
   }
 
  private:
-  static constexpr std::size_t kMost = 64;
-  using Terms = std::array<double, kMost + 1>;  // by the power of t
+  static constexpr std::size_t kMostTerms = 64;
+  using Terms = std::array<double, kMostTerms + 1>;  // by the power of t
 
   /// Even and odd powers apart, because a sum has to wait for the one before.
   template <class T>

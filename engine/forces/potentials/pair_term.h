@@ -58,7 +58,7 @@ class PairTerm final : public Interaction<D> {
           for (int a = 0; a < D; ++a)
             for (int b = 0; b < D; ++b) fluxes.stress[D * a + b].add(d[a] * force[b]);
           for (const Id i : {pairs_.id(batch.row[r].row), pairs_.id(batch.second[k])}) {
-            fluxes.add_to_slab(i, 0.5, d * force.transpose());
+            if (!fluxes.slab_of.empty()) fluxes.add_to_slab(i, 0.5, d * force.transpose());
             const Vec<D> current = 0.5 * (w * potential_.value(rho) * v[i] + force.dot(v[i]) * d);
             for (int axis = 0; axis < D; ++axis) fluxes.heat[axis].add(current[axis]);
           }

@@ -257,16 +257,16 @@ class PairsWithinCutoff {
   /// Throws Error(Failure::numerical) if there are too many.
   template <class Visit>
   void for_each_own_image(Visit&& visit) const {
-    constexpr double kMost = 1e8;
+    constexpr double kMostOwnImages = 1e8;
     std::array<int, 3> last{};
     double all = 1;
     for (int k = 0; k < D; ++k) {
       if (!box_.periodic(k)) continue;
       const double boxes = std::floor(cutoff_ / box_.edges[k]);
       all *= 2 * boxes + 1;
-      last[k] = static_cast<int>(std::min(boxes, kMost));
+      last[k] = static_cast<int>(std::min(boxes, kMostOwnImages));
     }
-    if (all > kMost)
+    if (all > kMostOwnImages)
       throw Error(Failure::numerical, "too many of a particle's own images are within the cutoff of " +
                                           short_text(cutoff_) + "; use a shorter cutoff");
     Image<D> image{};

@@ -119,13 +119,13 @@ TEST(Profile, FollowsWallsThatMoveAndLeavesOutWhatIsBeyondAnOpenEdge) {
   const auto along = make_observable("profile", *system, {{"interval", 1.0}, {"bins", 2}});
   for (const double time : {0.0, 2.0})
     for (const auto& profile : {up.get(), along.get()}) profile->sample(time, system->particles);
-  // From 0 to 5 first, from 0.5 to 3 then; the second particle is below the middle first and near it then, 1.6 < 1.75.
+  // The faces are at 0 and 5 first, at 0.5 and 3 then. Both particles are in the lower slab each time.
   EXPECT_EQ(column(up->table(), "x"), (std::vector<double>{(1.25 + 1.125) / 2, (3.75 + 2.375) / 2}));
   EXPECT_EQ(column(up->table(), "density"), (std::vector<double>{4 / (8 * 2.5 + 8 * 1.25), 0}));
   EXPECT_EQ(column(along->table(), "density"), (std::vector<double>{2 / (4 * 5 + 4 * 2.5), 0}));
 }
 
-/// The mean over all slabs is the pressure tensor, and at rest the normal pressure is the same in each slab.
+/// The mean over all slabs is the pressure tensor.
 TEST(Profile, PressuresAddUpToThePressureTensor) {
   for (const bool forces : {false, true}) {
     auto system = test::hard_spheres<3>(4, 0.3);
