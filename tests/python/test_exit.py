@@ -78,7 +78,7 @@ def test_python_waits_until_no_run_is_in_the_engine():
 def late():
     for sim in sims:
         sim.velocity = sim.velocity  # UsageError while a run is going on
-    print(len(sims), "at rest")
+    print(f"{len(sims)} at rest")  # one string: the threads print as well, between two arguments too
 sims = []
 atexit.register(late)"""
     assert "2 at rest" in ends("sim = gas(4096, step=1e9); sims.append(sim); (len(sims) == 2 and begun.set()); sim.run(time=1e9)",
