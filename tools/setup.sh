@@ -42,15 +42,20 @@ install_packages() {
   "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install --yes --no-install-recommends $missing >&2
 }
 
+# cmake ARGUMENT…; a new directory gets Ninja, since make, CMake's own choice, need not be installed.
+configure() {
+  if command -v ninja >/dev/null; then local -x CMAKE_GENERATOR=${CMAKE_GENERATOR:-Ninja}; fi
+  cmake "$@" >&2
+}
+
 # build PRESET [TARGET…]: sets build_dir.
 build() {
-  local preset=$1 generator=()
+  local preset=$1
   shift
   build_dir=$carom_root/build/$preset
   # A directory that was once generated looks after itself: the build runs CMake again when its files have changed.
   if [ ! -f "$build_dir/build.ninja" ] && [ ! -f "$build_dir/Makefile" ]; then
-    if command -v ninja >/dev/null; then generator=(-G Ninja); fi
-    (cd "$carom_root" && cmake --preset "$preset" "${generator[@]}") >&2
+    (cd "$carom_root" && configure --preset "$preset")
   fi
   cmake --build "$build_dir" --parallel "$(nproc)" ${1:+--target "$@"} >&2
 }

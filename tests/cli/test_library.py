@@ -13,7 +13,8 @@ BUILD = pathlib.Path(os.environ["CAROM"]).parents[1]
 
 
 def run(*command):
-    return subprocess.run([str(part) for part in command], check=True, capture_output=True, text=True).stdout
+    """Standard output; pytest shows what a command that fails writes to standard error."""
+    return subprocess.run([str(part) for part in command], check=True, stdout=subprocess.PIPE, text=True).stdout
 
 
 @pytest.fixture(scope="module")
@@ -21,18 +22,22 @@ def examples(tmp_path_factory):
     """The folder of the built examples."""
     prefix, folder = tmp_path_factory.mktemp("prefix"), tmp_path_factory.mktemp("examples")
     run("cmake", "--install", BUILD, "--prefix", prefix)
-    run("cmake", "-S", ROOT / "engine/examples", "-B", folder, f"-DCMAKE_PREFIX_PATH={prefix}",
+    run("cmake", "-G", cached("CMAKE_GENERATOR"), "-S", ROOT / "engine/examples", "-B", folder, f"-DCMAKE_PREFIX_PATH={prefix}",
         "-DCMAKE_BUILD_TYPE=Release", f"-DCMAKE_CXX_FLAGS={sanitizers()}")
     run("cmake", "--build", folder, "-j2")
     assert not list(prefix.rglob("*_kernel.h"))
     return folder
 
 
+def cached(name):
+    """The value that CMake keeps of a variable of the build: its generator is installed, make, CMake's own choice, need not be."""
+    found = re.search(rf"^{name}:\w+=(.+)$", (BUILD / "CMakeCache.txt").read_text(), re.M)
+    return found and found[1]
+
+
 def sanitizers():
     """The dependencies of the library must be linked into the examples, too."""
-    cache = (BUILD / "CMakeCache.txt").read_text()
-    found = re.search(r"^CAROM_SANITIZE:\w+=(.+)$", cache, re.M)
-    return f"-fsanitize={found[1]}" if found else ""
+    return f"-fsanitize={cached('CAROM_SANITIZE')}" if cached("CAROM_SANITIZE") else ""
 
 
 def test_five_springs_keep_their_energy(examples):
@@ -78,6 +83,6 @@ def test_a_slow_piston_keeps_to_the_adiabat(examples):
 
 def test_the_engine_alone_needs_neither_mpi_nor_hdf5(tmp_path):
     absent = [f"-DCMAKE_DISABLE_FIND_PACKAGE_{name}=ON" for name in ("MPI", "HDF5", "spdlog", "CLI11", "nlohmann_json")]
-    run("cmake", "-S", ROOT, "-B", tmp_path, "-DCAROM_ENGINE_ONLY=ON", *absent)
+    run("cmake", "-G", cached("CMAKE_GENERATOR"), "-S", ROOT, "-B", tmp_path, "-DCAROM_ENGINE_ONLY=ON", *absent)
     commands = (tmp_path / "compile_commands.json").read_text()
     assert "/engine/" in commands and "/io/" not in commands and "/parallel/" not in commands
