@@ -5,9 +5,7 @@
 #include <string>
 
 #include "engine/base/error.h"
-#include "engine/events/collision.h"
-#include "engine/events/contact.h"
-#include "engine/events/shaken_contact.h"
+#include "engine/events/meeting.h"
 
 namespace carom {
 namespace {
@@ -148,19 +146,14 @@ double Flights<D>::wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall)
   if (is_fixed(mass(i))) return kNever;
   if (wall.bath) return wall.bath->next_kick(r.id, box_.time, r.t, horizon_);
   const double at_record = grown(radius(i), r.t), rate = radius(i) * growth_;
-  const double gap = wall.gap(r.x, at_record, r.t), opening = wall.opening(r.v, r.t) - rate;
   const double slack = approach_slack(1.0, r.v.norm(), rate + std::abs(wall.velocity_at(r.t)));
-  const bool touching = gap <= gap_tolerance_(at_record);
-  const double rest = horizon_ - r.t;
-  if (wall.one_way && !(gap < kNever))
-    return r.t + return_time(wall.clearance(r.x, at_record, r.t), opening, wall.speeding(g_), rest);
-  const double s = wall.amplitude == 0 ? wall_contact_time(gap, opening, wall.speeding(g_), rest, touching, slack)
-                                       : shaken_contact(r, at_record, rate, wall, touching, slack);
+  const double s = wall_meeting<D>(wall, r.x, r.v, g_, at_record, rate, r.t, horizon_ - r.t, gap_tolerance_(at_record),
+                                   [&] { return slack; });
   if (!std::isfinite(slack))
     throw Error(Failure::numerical, "the speed of particle " + std::to_string(r.id) +
                                         " is too large: its square is no number; give smaller velocities, "
                                         "temperatures and accelerations");
-  if (s == 0 && !(opening < -slack) && !wall.thermal())
+  if (s == 0 && !(wall.opening(r.v, r.t) - rate < -slack) && !wall.thermal())
     throw Error(Failure::numerical,
                 "particle " + std::to_string(r.id) + " rests on " + box_.wall_name(wall.number) +
                     " under the uniform field and would bounce without end; give it a height or a velocity");
@@ -168,61 +161,42 @@ double Flights<D>::wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall)
 }
 
 template <int D>
-double Flights<D>::shaken_contact(const Record<D>& r, double radius, double rate, const Wall<D>& wall, bool touching,
-                                  double slack) const {
-  const double distance = wall.normal.dot(r.x) - (wall.offset + wall.velocity * r.t);
-  if (!wall.one_sided && !(distance > wall.level(r.t) - wall.offset)) return kNever;
-  const ShakenGap gap{.y = distance - radius,
-                      .v = wall.along_normal(r.v) - wall.velocity - rate,
-                      .a = wall.along_normal(g_),
-                      .amplitude = wall.amplitude,
-                      .frequency = wall.frequency,
-                      .turns = wall.turns + wall.frequency * r.t};
-  return gap.first_contact(horizon_ - r.t, touching, slack);
-}
-
-template <int D>
-template <class... Spins>
-[[gnu::always_inline]] inline Impact<D> Flights<D>::collide_with(Slot i, Record<D>& a, Slot j, Record<D>& b,
-                                                                 const Vec<D>& shift, double t,
-                                                                 std::uint32_t generation, Spins... spins) const {
+template <bool kRough>
+[[gnu::always_inline]] inline Impact<D> Flights<D>::collide_with(Slot i, Record<D>& a, Spin<D>* spin_a, Slot j,
+                                                                 Record<D>& b, Spin<D>* spin_b, const Vec<D>& shift,
+                                                                 double t, std::uint32_t generation) const {
   advance(a, t);
   advance(b, t);
   const Vec<D> d = a.x - b.x + shift;
-  const double mass_a = mass(i), mass_b = mass(j);
   const double radii = radius(i) + radius(j), sigma = grown(radii, t);
-  auto [factor, dissipated] =
-      pair_impulse<D>(laws(), a.species, b.species, d, a.v - b.v, mass_a, mass_b, sigma, radii * growth_);
-  Vec<D> impulse = factor * d;
-  if constexpr (sizeof...(spins) > 0) {
-    const auto [spin_a, spin_b] = std::pair(spins...);
-    const Rubbed<D> rubbed = rub_pair<D>(laws(), d, a.v - b.v, factor, {mass_a, radius(i), a.species, spin_a},
-                                         {mass_b, radius(j), b.species, spin_b});
-    impulse += rubbed.impulse;
-    dissipated += rubbed.dissipated;
-  }
+  const Partner<D> of_a{mass(i), radius(i), a.species, spin_a}, of_b{mass(j), radius(j), b.species, spin_b};
+  const Vec<D> v = a.v - b.v;
+  const double w = radii * growth_;
+  const PairImpulse<D> met = kRough ? pair_impulse<D>(laws(), d, v, of_a, of_b, sigma, w)
+                                    : normal_impulse<D>(laws(), d, v, of_a, of_b, sigma, w);
+  const Vec<D> impulse = met.on_first(d);
   if (common_mass_ == 1) {  // gives the same bits without divisions
     a.v += impulse;
     b.v -= impulse;
   } else {
-    a.v += impulse / mass_a;
-    b.v -= impulse / mass_b;
+    a.v += impulse / of_a.mass;
+    b.v -= impulse / of_b.mass;
   }
   a.generation = b.generation = static_cast<std::uint16_t>(generation);
-  return {d, impulse, {.virial = d.dot(impulse), .dissipated = dissipated}, 1 - d.norm() / sigma, sigma};
+  return {d, impulse, {.virial = d.dot(impulse), .dissipated = met.dissipated}, 1 - d.norm() / sigma, sigma};
 }
 
 template <int D>
 Impact<D> Flights<D>::collide_smooth(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
                                      std::uint32_t generation) const {
-  return collide_with(i, a, j, b, shift, t, generation);
+  return collide_with<false>(i, a, nullptr, j, b, nullptr, shift, t, generation);
 }
 
 template <int D>
 Impact<D> Flights<D>::collide(Slot i, Record<D>& a, Spin<D>* spin_a, Slot j, Record<D>& b, Spin<D>* spin_b,
                               const Vec<D>& shift, double t, std::uint32_t generation) const {
   if (!rough_) return collide_smooth(i, a, j, b, shift, t, generation);
-  return collide_with(i, a, j, b, shift, t, generation, spin_a, spin_b);
+  return collide_with<true>(i, a, spin_a, j, b, spin_b, shift, t, generation);
 }
 
 template <int D>
@@ -231,8 +205,8 @@ Impact<D> Flights<D>::bounce(Slot i, Record<D>& r, Spin<D>* spin, const Wall<D>&
   advance(r, t);
   const double at_contact = grown(radius(i), t), rate = radius(i) * growth_;
   const auto [after, impulse, exchange] =
-      wall_impulse<D>(laws(), wall, r.species, mass(i), r.v, {.id = r.id, .time = box_.time + t, .number = generation},
-                      t, rate, at_contact, rough_ ? spin : nullptr);
+      wall_impulse<D>(laws(), wall, r.v, {mass(i), at_contact, r.species, rough_ ? spin : nullptr},
+                      {.id = r.id, .time = box_.time + t, .number = generation}, t, rate);
   r.v = after;
   r.generation = static_cast<std::uint16_t>(generation);
   const double overlap = wall.bath ? 0 : -wall.gap(r.x, at_contact, t) / at_contact;

@@ -132,10 +132,10 @@ class Flights {
   bool equal() const { return common_radius_ != 0; }
 
  private:
-  /// A collision; of rough spheres with the two spins, so that plain ones cost what they would without them.
-  template <class... Spins>
-  Impact<D> collide_with(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
-                         std::uint32_t generation, Spins... spins) const;
+  /// Plain spheres cost what they would if there were no rough ones.
+  template <bool kRough>
+  Impact<D> collide_with(Slot i, Record<D>& a, Spin<D>* spin_a, Slot j, Record<D>& b, Spin<D>* spin_b,
+                         const Vec<D>& shift, double t, std::uint32_t generation) const;
   Impact<D> collide_smooth(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
                            std::uint32_t generation) const;
   void set_walls();
@@ -150,8 +150,6 @@ class Flights {
     }
     r.t = t;
   }
-  double shaken_contact(const Record<D>& r, double radius, double rate, const Wall<D>& wall, bool touching,
-                        double slack) const;
   /// The spheres of a compression, which grow, are elastic.
   const ContactLaws& laws() const { return growth_ == 0 ? box_.contacts : elastic_; }
   double grown(double length, double t) const { return length * (1 + growth_ * t); }

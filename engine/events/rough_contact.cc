@@ -7,7 +7,7 @@ namespace carom {
 namespace {
 
 template <int D>
-double moment_of(const ContactLaws& laws, const RoughSphere<D>& a) {
+double moment_of(const ContactLaws& laws, const Partner<D>& a) {
   return laws.moment(a.species, a.mass, a.radius, D);
 }
 
@@ -23,8 +23,8 @@ Rubbed<D> rub(const ContactLaw& law, const Vec<D>& slip, double resisting, doubl
 }  // namespace
 
 template <int D>
-Rubbed<D> rub_pair(const ContactLaws& laws, const Vec<D>& d, const Vec<D>& v, double factor, const RoughSphere<D>& a,
-                   const RoughSphere<D>& b) {
+Rubbed<D> rub_pair(const ContactLaws& laws, const Vec<D>& d, const Vec<D>& v, double factor, const Partner<D>& a,
+                   const Partner<D>& b) {
   const ContactLaw& law = laws.of_pair(a.species, b.species);
   const double dv = d.dot(v), square = d.squaredNorm();
   if (!law.rubs(std::sqrt(dv * dv / square), laws.thermal_speed)) return {};
@@ -42,7 +42,7 @@ Rubbed<D> rub_pair(const ContactLaws& laws, const Vec<D>& d, const Vec<D>& v, do
 
 template <int D>
 Rubbed<D> rub_wall(const ContactLaws& laws, std::uint32_t wall, const Vec<D>& normal, const Vec<D>& v, double closing,
-                   double pressing, const RoughSphere<D>& a) {
+                   double pressing, const Partner<D>& a) {
   const ContactLaw& law = laws.of_wall(a.species, wall);
   if (!law.rubs(closing, laws.thermal_speed)) return {};
   const double moment = moment_of(laws, a);
@@ -54,13 +54,13 @@ Rubbed<D> rub_wall(const ContactLaws& laws, std::uint32_t wall, const Vec<D>& no
   return rubbed;
 }
 
-template Rubbed<2> rub_pair(const ContactLaws&, const Vec<2>&, const Vec<2>&, double, const RoughSphere<2>&,
-                            const RoughSphere<2>&);
-template Rubbed<3> rub_pair(const ContactLaws&, const Vec<3>&, const Vec<3>&, double, const RoughSphere<3>&,
-                            const RoughSphere<3>&);
+template Rubbed<2> rub_pair(const ContactLaws&, const Vec<2>&, const Vec<2>&, double, const Partner<2>&,
+                            const Partner<2>&);
+template Rubbed<3> rub_pair(const ContactLaws&, const Vec<3>&, const Vec<3>&, double, const Partner<3>&,
+                            const Partner<3>&);
 template Rubbed<2> rub_wall(const ContactLaws&, std::uint32_t, const Vec<2>&, const Vec<2>&, double, double,
-                            const RoughSphere<2>&);
+                            const Partner<2>&);
 template Rubbed<3> rub_wall(const ContactLaws&, std::uint32_t, const Vec<3>&, const Vec<3>&, double, double,
-                            const RoughSphere<3>&);
+                            const Partner<3>&);
 
 }  // namespace carom

@@ -21,10 +21,10 @@ namespace carom {
 
 /// A sphere in a contact.
 template <int D>
-struct RoughSphere {
+struct Partner {
   double mass, radius;
   std::uint16_t species;
-  Spin<D>* spin;  ///< changes in the contact
+  Spin<D>* spin = nullptr;  ///< changes in the contact; null: no contact is rough
 };
 
 template <int D>
@@ -36,13 +36,13 @@ struct Rubbed {
 /// A contact of two spheres with d = x_a − x_b and the relative velocity v = v_a − v_b before it; its normal impulse is
 /// factor·d.
 template <int D>
-Rubbed<D> rub_pair(const ContactLaws& laws, const Vec<D>& d, const Vec<D>& v, double factor, const RoughSphere<D>& a,
-                   const RoughSphere<D>& b);
+Rubbed<D> rub_pair(const ContactLaws& laws, const Vec<D>& d, const Vec<D>& v, double factor, const Partner<D>& a,
+                   const Partner<D>& b);
 
 /// A contact of a sphere with velocity v and a wall, which moves along its normal only: the normal speed of approach
 /// and the normal impulse.
 template <int D>
 Rubbed<D> rub_wall(const ContactLaws& laws, std::uint32_t wall, const Vec<D>& normal, const Vec<D>& v, double closing,
-                   double pressing, const RoughSphere<D>& a);
+                   double pressing, const Partner<D>& a);
 
 }  // namespace carom

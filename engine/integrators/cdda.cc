@@ -11,7 +11,7 @@
 #include <optional>
 
 #include "engine/base/error.h"
-#include "engine/events/collision.h"
+#include "engine/events/meeting.h"
 #include "engine/integrators/chord_contacts.h"
 #include "engine/integrators/discrete_gradient.h"
 #include "engine/integrators/registry.h"

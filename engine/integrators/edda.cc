@@ -27,7 +27,7 @@
 
 #include "engine/base/elementary.h"
 #include "engine/base/error.h"
-#include "engine/events/collision.h"
+#include "engine/events/meeting.h"
 #include "engine/forces/forces.h"
 #include "engine/forces/stiffness.h"
 #include "engine/integrators/chebyshev.h"

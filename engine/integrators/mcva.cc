@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "engine/base/error.h"
-#include "engine/events/collision.h"
+#include "engine/events/meeting.h"
 #include "engine/integrators/collision_verlet.h"
 #include "engine/integrators/registry.h"
 
@@ -157,7 +157,7 @@ class ModifiedCollisionVerlet : public Integrator<D> {
     double lambda = a > 0 && b < 0 && discriminant >= 0 ? (std::sqrt(discriminant) - b) / a : -2 * b / a;
     double dissipated = 0;
     if (!system.box.contacts.elastic()) {  // the shadow impulse is elastic
-      const Impulse inelastic = law(system, touch);
+      const PairImpulse<D> inelastic = law(system, touch);
       if (inelastic.dissipated != 0) lambda = inelastic.factor, dissipated = inelastic.dissipated;
     }
     // Impulses that remove most of a slow pair's normal velocity, contact after contact, would bring it to rest.
@@ -184,15 +184,14 @@ class ModifiedCollisionVerlet : public Integrator<D> {
   }
 
   /// The impulse of the law of this contact, in multiples of the normal.
-  static Impulse law(const System<D>& system, const Touch<D>& touch) {
+  static PairImpulse<D> law(const System<D>& system, const Touch<D>& touch) {
     const auto& p = system.particles;
     const Id lo = touch.key.lo, hi = touch.key.hi;
+    const auto partner = [&](Id i) { return Partner<D>{p.mass[i], p.radius[i], p.species[i]}; };
     if (touch.pair())
-      return pair_impulse<D>(system.box.contacts, p.species[lo], p.species[hi], touch.normal, p.v[lo] - p.v[hi],
-                             p.mass[lo], p.mass[hi]);
-    const auto bounced =
-        wall_impulse<D>(system.box.contacts, system.box.wall(hi), p.species[lo], p.mass[lo], p.v[lo], {});
-    return {bounced.exchange.impulse, bounced.exchange.dissipated};
+      return pair_impulse<D>(system.box.contacts, touch.normal, p.v[lo] - p.v[hi], partner(lo), partner(hi));
+    const auto bounced = wall_impulse<D>(system.box.contacts, system.box.wall(hi), p.v[lo], partner(lo), {});
+    return {.factor = bounced.exchange.impulse, .dissipated = bounced.exchange.dissipated};
   }
 
   double h_;

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "engine/events/collision.h"
+#include "engine/events/meeting.h"
 #include "engine/integrators/kicks.h"
 #include "engine/integrators/registry.h"
 #include "engine/slabs/slab_core.h"

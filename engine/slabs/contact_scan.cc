@@ -6,6 +6,7 @@
 #include <string>
 
 #include "engine/base/error.h"
+#include "engine/events/meeting.h"
 
 namespace carom {
 
@@ -422,15 +423,11 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
   for (Id i = 0; i < x.size(); ++i) {
     if (particles_.fixed(i)) continue;
     for (const Wall<D>& wall : walls()) {
-      const double gap = wall.gap(x[i], particles_.radius[i]);
+      const double radius = particles_.radius[i];
       key.lo = i;
       key.hi = wall.number;
-      const bool touching = gap <= tolerance(particles_.radius[i]);
-      const double opening = wall.opening(v[i]), speeding = wall.speeding(a[i]);
-      if (wall.one_way && !(gap < kNever))
-        key.time = return_time(wall.clearance(x[i], particles_.radius[i]), opening, speeding, rest);
-      else
-        key.time = wall_contact_time(gap, opening, speeding, rest, touching, touching ? rounding_speed(key, v) : 0.0);
+      key.time = wall_meeting<D>(wall, x[i], v[i], a[i], radius, 0, 0, rest, tolerance(radius),
+                                 [&] { return rounding_speed(key, v); });
       if (key.time < kNever) offer(wall.normal);
     }
   }

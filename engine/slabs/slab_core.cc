@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "engine/base/error.h"
-#include "engine/events/collision.h"
+#include "engine/events/meeting.h"
 #include "engine/forces/forces.h"
 #include "engine/ranks/shared_contacts.h"
 #include "engine/slabs/path_hash.h"
@@ -280,13 +280,8 @@ void SlabCore<D>::predict_walls(Id i) {
   const double t = start(i), radius = particles_.radius[i];
   const Vec<D> x = position(i, t), v = velocity(i, t), a = acceleration(i);
   for (const Wall<D>& wall : walls_) {
-    const double gap = wall.gap(x, radius, t);
-    const bool touching = gap <= scan_->tolerance(radius);
-    const double opening = wall.opening(v, t), speeding = wall.speeding(a), rest = length_ - t;
-    const double s =
-        wall.one_way && !(gap < kNever)
-            ? return_time(wall.clearance(x, radius, t), opening, speeding, rest)
-            : wall_contact_time(gap, opening, speeding, rest, touching, touching ? scan_->rounding_speed(i, v) : 0.0);
+    const double s = wall_meeting<D>(wall, x, v, a, radius, 0, t, length_ - t, scan_->tolerance(radius),
+                                     [&] { return scan_->rounding_speed(i, v); });
     if (!(t + s < length_)) continue;
     EventKey<D> key{.time = t + s, .kind = EventKind::wall, .lo = i, .hi = wall.number};
     if (!held_.empty() && scan_->rests(key)) continue;
@@ -399,8 +394,11 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
   flight(key.lo, key);
   if (key.kind == EventKind::pair) flight(key.hi, key);  // flights_ may have moved
   Flight& lo = flights_[slot_[key.lo] - 1];
-  const double mass = particles_.mass[key.lo];
   Contact<D> contact{key, lo.x, lo.x, Vec<D>::Zero()};
+  const auto partner = [&](Flight& f) {
+    return Partner<D>{particles_.mass[f.id], particles_.radius[f.id], particles_.species[f.id],
+                      box_.contacts.rough() ? &f.spin : nullptr};
+  };
   const auto checks_path = [&](const Flight& f) {
     const double far = (f.x - particles_.x[f.id]).norm() + path(f.v, acceleration(f.id), length_ - f.t);
     if (!(far <= margin_)) note_path(far);
@@ -410,35 +408,21 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     if (!(wall.opening(lo.v, key.time) < 0) && !wall.thermal()) return;
     // Sweeps change the time of a contact, not its random numbers.
     const Draw draw{.id = particles_.id_of(key.lo), .time = box_.time, .number = std::uint64_t{lo.version} << 32};
-    const auto [after, impulse, exchange] =
-        wall_impulse<D>(box_.contacts, wall, particles_.species[key.lo], mass, lo.v, draw, key.time, 0,
-                        particles_.radius[key.lo], box_.contacts.rough() ? &lo.spin : nullptr);
+    const auto [after, impulse, exchange] = wall_impulse<D>(box_.contacts, wall, lo.v, partner(lo), draw, key.time);
     contact.impulse = impulse;
     contact.exchange = exchange;
     lo.v = after;
     contact.x_hi = wall.foot(lo.x, key.time);
   } else {
     Flight& hi = flights_[slot_[key.hi] - 1];
-    const double mass_hi = particles_.mass[key.hi];
     const Vec<D> d = lo.x - hi.x + box_.shift(key.image), v = lo.v - hi.v;
     if (!(d.dot(v) < 0)) return;
-    const auto [g, dissipated] =
-        pair_impulse<D>(box_.contacts, particles_.species[key.lo], particles_.species[key.hi], d, v, mass, mass_hi);
-    contact.impulse = g * d;
+    const auto impulse = pair_impulse<D>(box_.contacts, d, v, partner(lo), partner(hi));
+    impulse.apply(d, particles_.mass[key.lo], lo.v, particles_.mass[key.hi], hi.v);
+    contact.impulse = impulse.on_first(d);
     contact.x_hi = hi.x - box_.shift(key.image);
-    contact.exchange = {.virial = (contact.x_lo - contact.x_hi).dot(contact.impulse), .dissipated = dissipated};
-    lo.v += (g / mass) * d;
-    hi.v -= (g / mass_hi) * d;
-    if (box_.contacts.rough()) {
-      const auto sphere = [&](Flight& f) {
-        return RoughSphere<D>{particles_.mass[f.id], particles_.radius[f.id], particles_.species[f.id], &f.spin};
-      };
-      const Rubbed<D> rubbed = rub_pair<D>(box_.contacts, d, v, g, sphere(lo), sphere(hi));
-      lo.v += rubbed.impulse / mass;
-      hi.v -= rubbed.impulse / mass_hi;
-      contact.impulse += rubbed.impulse;
-      contact.exchange.dissipated += rubbed.dissipated;
-    }
+    contact.exchange = {.virial = (contact.x_lo - contact.x_hi).dot(impulse.factor * d),
+                        .dissipated = impulse.dissipated};
     contact.v_hi = hi.v;
     checks_path(hi);
   }

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "engine/base/random.h"
-#include "engine/events/collision.h"
 #include "engine/events/contact.h"
+#include "engine/events/meeting.h"
 
 namespace carom {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "engine/base/error.h"
-#include "engine/events/collision.h"
+#include "engine/events/meeting.h"
 #include "tests/support/experiments.h"
 
 namespace carom {
@@ -30,13 +30,14 @@ TEST(ContactLaws, ImpulseGivesBackAFractionOfTheNormalSpeed) {
   laws.set_pair(0, 1, law);
   laws.set_wall(1, 0, law);
   const Vec<2> d{0.6, 0.8}, v{-1, -3};
-  const auto [factor, lost] = pair_impulse<2>(laws, 1, 0, d, v, 2.0, 3.0);
-  const Vec<2> after = v + factor * (1 / 2.0 + 1 / 3.0) * d;
+  const Partner<2> a{2.0, 0.5, 1}, b{3.0, 0.5, 0};
+  const auto met = pair_impulse<2>(laws, d, v, a, b);
+  const Vec<2> after = v + met.factor * (1 / 2.0 + 1 / 3.0) * d;
   EXPECT_NEAR(after.dot(d), -0.6 * v.dot(d), 1e-15);
-  EXPECT_NEAR(lost, 0.5 * 1.2 * (1 - 0.36) * v.dot(d) * v.dot(d), 1e-14);
-  EXPECT_EQ((pair_impulse<2>(laws, 0, 0, d, v, 2.0, 3.0).dissipated), 0);
+  EXPECT_NEAR(met.dissipated, 0.5 * 1.2 * (1 - 0.36) * v.dot(d) * v.dot(d), 1e-14);
+  EXPECT_EQ((pair_impulse<2>(laws, d, v, b, b).dissipated), 0);
   Wall<2> wall{.axis = 0, .normal = {1, 0}, .velocity = 0.5};
-  const auto bounced = wall_impulse<2>(laws, wall, 1, 2.0, v, {});
+  const auto bounced = wall_impulse<2>(laws, wall, v, a, {});
   EXPECT_NEAR(bounced.v[0], 0.5 + 0.6 * 1.5, 1e-15);
   EXPECT_NEAR(0.5 * 2 * (bounced.v.squaredNorm() - v.squaredNorm()),
               bounced.exchange.work - bounced.exchange.dissipated, 1e-14);

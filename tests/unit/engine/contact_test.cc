@@ -6,7 +6,7 @@
 #include <boost/multiprecision/cpp_bin_float.hpp>
 #include <random>
 
-#include "engine/events/collision.h"
+#include "engine/events/meeting.h"
 
 namespace carom {
 namespace {

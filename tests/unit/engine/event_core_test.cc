@@ -7,8 +7,8 @@
 #include <random>
 
 #include "engine/base/error.h"
-#include "engine/events/collision.h"
 #include "engine/events/contact.h"
+#include "engine/events/meeting.h"
 #include "engine/forces/forces.h"
 #include "tests/support/experiments.h"
 

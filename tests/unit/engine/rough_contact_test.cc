@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "engine/base/error.h"
-#include "engine/events/collision.h"
+#include "engine/events/meeting.h"
 #include "tests/support/experiments.h"
 #include "tests/support/thread_ranks.h"
 #include "tests/unit/engine/event_cases.h"
