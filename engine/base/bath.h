@@ -15,9 +15,6 @@ struct Bath {
     rescaling,  ///< scales all velocities at the end of each slab (Bussi, Donadio, Parrinello, J. Chem. Phys. 126
                 ///< (2007) 014101)
   };
-  /// The number of a kick's wall in event keys: a kick is an event of one particle, like a contact with a wall.
-  static constexpr Id kNumber = 0xfffffffe;
-
   Type type = Type::none;
   double temperature = 1, last_temperature = 1;  ///< at the start and at the end of a linear ramp [energy]
   double ramp_start = 0, ramp_end = 0;  ///< Simulation sets them to the ends of the run if they are equal [time]

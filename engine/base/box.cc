@@ -130,7 +130,6 @@ void Box<D>::check(Failure failure) const {
 
 template <int D>
 std::string Box<D>::wall_name(Id number) const {
-  if (number == Bath::kNumber) return "the bath";
   if (number >= 2 * D) return "the wall '" + find(number)->name + "'";
   const std::string side = number % 2 == 0 ? "the lower" : "the upper";
   return side + " wall of axis " + std::to_string(number / 2);
@@ -138,7 +137,6 @@ std::string Box<D>::wall_name(Id number) const {
 
 template <int D>
 std::string Box<D>::name_of(Id number) const {
-  if (number == Bath::kNumber) return "bath";
   return number >= 2 * D ? find(number)->name : face_names<D>()[number];
 }
 

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/base/bath.h"
 #include "engine/base/boundary.h"
 #include "engine/base/contact_law.h"
 #include "engine/base/error.h"
@@ -90,16 +91,10 @@ struct Box {
       if (!bounded(k)) return false;
     return true;
   }
-  /// The wall with this number, from `time` on; it must exist. With Bath::kNumber: the kicks of the bath.
+  /// The wall with this number, from `time` on; it must exist.
   Wall<D> wall(Id number) const {
     const WallOptions<D>* const its = find(number);
     Wall<D> wall{.number = number};
-    if (number == Bath::kNumber) {
-      wall.temperature = bath.temperature;
-      wall.seed = bath.seed;
-      wall.bath = &bath;
-      return wall;
-    }
     if (number < 2 * D) {
       wall.axis = static_cast<int>(number / 2);
       wall.normal = (number % 2 == 0 ? 1.0 : -1.0) * Vec<D>::Unit(wall.axis);

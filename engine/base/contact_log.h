@@ -10,7 +10,8 @@
 
 namespace carom {
 
-enum class EventKind : std::uint8_t { pair = 0, wall = 1 };
+/// A kick by the bath is an event of one particle, like a contact with a wall.
+enum class EventKind : std::uint8_t { pair = 0, wall = 1, kick = 2 };
 
 /// A total order of events, the same on every machine and for every decomposition. `generation` orders events at the
 /// same instant: it is 1 + the largest generation of the partners' records with the time of the event, or 0 if there is
@@ -20,8 +21,8 @@ struct EventKey {
   double time = 0;  ///< since the start of the slab or epoch
   std::uint32_t generation = 0;
   EventKind kind = EventKind::pair;
-  Id lo = 0;  ///< the lower id; for a wall event the particle
-  Id hi = 0;  ///< the higher id; for a wall event the number of the wall
+  Id lo = 0;  ///< the lower id; of a wall or kick event the particle
+  Id hi = 0;  ///< the higher id; of a wall event the number of the wall, of a kick 0
   Image<D> image{};
   auto operator<=>(const EventKey&) const = default;
 };
@@ -41,7 +42,7 @@ template <int D>
 std::string partners(const EventKey<D>& key, const Box<D>& box) {
   const std::string lo = std::to_string(key.lo);
   if (key.kind == EventKind::pair) return "particles " + lo + " and " + std::to_string(key.hi);
-  return "particle " + lo + " and " + box.wall_name(key.hi);
+  return "particle " + lo + " and " + (key.kind == EventKind::kick ? "the bath" : box.wall_name(key.hi));
 }
 
 /// The energies of a contact: the kinetic energy changes by work + heat − dissipated.
@@ -49,24 +50,26 @@ struct Exchange {
   double virial = 0;      ///< of a pair: (x_lo − x_hi)·impulse as computed [energy]
   double impulse = 0;     ///< of a wall: on the sphere, along the wall's normal [mass·length/time]
   double work = 0;        ///< that a moving wall does on the sphere [energy]
-  double heat = 0;        ///< that the sphere gets from a thermal wall [energy]
+  double heat = 0;        ///< that the sphere gets from a thermal wall or a bath [energy]
   double dissipated = 0;  ///< energy lost [energy]
 };
 
 /// An exchange in two numbers, for logs of many contacts.
 struct PackedExchange {
   double first = 0;  ///< the virial of a pair, the impulse of a wall
-  double lost = 0;   ///< what is dissipated; of a thermal wall the heat, negated
+  double lost = 0;   ///< what is dissipated; of a thermal wall or a bath the heat, negated
 
   PackedExchange() = default;
   PackedExchange(EventKind kind, const Exchange& all)
       : first(kind == EventKind::pair ? all.virial : all.impulse), lost(all.dissipated - all.heat) {}
-  /// `wall`: null for a pair.
+  /// `number`: that of the wall, if it is one.
   template <int D>
-  Exchange unpacked(const Wall<D>* wall, double time) const {
-    if (!wall) return {.virial = first, .dissipated = lost};
-    Exchange all{.impulse = first, .work = wall->velocity_at(time) * first};
-    (wall->thermal() ? all.heat : all.dissipated) = wall->thermal() ? -lost : lost;
+  Exchange unpacked(EventKind kind, Id number, const Box<D>& box, double time) const {
+    if (kind == EventKind::pair) return {.virial = first, .dissipated = lost};
+    if (kind == EventKind::kick) return {.heat = -lost};
+    const Wall<D> wall = box.wall(number);
+    Exchange all{.impulse = first, .work = wall.velocity_at(time) * first};
+    (wall.thermal() ? all.heat : all.dissipated) = wall.thermal() ? -lost : lost;
     return all;
   }
 };

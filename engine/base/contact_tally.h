@@ -110,16 +110,19 @@ struct ContactTally : OverlapTally {
     if (walls.size() <= number) walls.resize(number + 1);
     return walls[number];
   }
+  /// `number`: that of the wall, if it is one.
+  void add(EventKind kind, Id number, const Exchange& exchange) {
+    if (kind == EventKind::pair) return add_pair(exchange);
+    if (kind == EventKind::wall) return add_wall(number, exchange);
+    ++kicks;
+    heat.add(exchange.heat);
+  }
   void add_pair(const Exchange& exchange) {
     ++sphere_sphere;
     collision_virial.add(exchange.virial);
     if (exchange.dissipated != 0) dissipated.add(exchange.dissipated);
   }
   void add_wall(Id number, const Exchange& exchange) {
-    if (number == Bath::kNumber) {
-      ++kicks;
-      return heat.add(exchange.heat);
-    }
     ++sphere_wall;
     wall(number).add(exchange);
     for (const auto& [sum, term] :
@@ -143,10 +146,7 @@ struct ContactTally : OverlapTally {
   /// Counts a contact and appends it to `log` unless `log` is null.
   template <int D>
   void record(const Contact<D>& contact, std::vector<Contact<D>>* log) {
-    if (contact.key.kind == EventKind::pair)
-      add_pair(contact.exchange);
-    else
-      add_wall(contact.key.hi, contact.exchange);
+    add(contact.key.kind, contact.key.hi, contact.exchange);
     note_overlap(contact.overlap, [&] { return Overlap(contact.overlap, contact.sigma, contact.key); });
     if (log) log->push_back(contact);
   }

@@ -13,7 +13,6 @@
 #include <limits>
 #include <numbers>
 
-#include "engine/base/bath.h"
 #include "engine/base/normal_deviates.h"
 #include "engine/base/vec.h"
 
@@ -27,16 +26,15 @@ struct Wall {
   Vec<D> normal = Vec<D>::Zero();  ///< unit vector into the space of the spheres
   bool one_sided = true;           ///< false: does not act on spheres whose centres are behind the plane
   bool one_way = false;            ///< acts only on spheres that are wholly in front; others pass
-  double depth = 0;            ///< one_way: a sphere that is deeper in the plane by rounding still counts as in front
-  double offset = 0;           ///< level at time 0, the start of the slab [length]
-  double velocity = 0;         ///< along the normal, at time 0 [length/time]
-  double acceleration = 0;     ///< along the normal [length/time²]
-  double amplitude = 0;        ///< amplitude of the sine; 0: no sine [length]
-  double frequency = 0;        ///< frequency of the sine [1/time]
-  double turns = 0;            ///< phase of the sine at time 0, in turns
-  double temperature = 0;      ///< a thermal wall has one [energy]; 0: the wall is not thermal
-  std::uint64_t seed = 1;      ///< seed of the random numbers of a thermal wall
-  const Bath* bath = nullptr;  ///< not null: no wall at all, its contacts are the kicks of this bath
+  double depth = 0;         ///< one_way: a sphere that is deeper in the plane by rounding still counts as in front
+  double offset = 0;        ///< level at time 0, the start of the slab [length]
+  double velocity = 0;      ///< along the normal, at time 0 [length/time]
+  double acceleration = 0;  ///< along the normal [length/time²]
+  double amplitude = 0;     ///< amplitude of the sine; 0: no sine [length]
+  double frequency = 0;     ///< frequency of the sine [1/time]
+  double turns = 0;         ///< phase of the sine at time 0, in turns
+  double temperature = 0;   ///< a thermal wall has one [energy]; 0: the wall is not thermal
+  std::uint64_t seed = 1;   ///< seed of the random numbers of a thermal wall
 
   double along_normal(const Vec<D>& v) const { return axis >= 0 ? normal[axis] * v[axis] : normal.dot(v); }
   double level(double t) const {

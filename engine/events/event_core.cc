@@ -140,13 +140,13 @@ double EventCore<D>::run(double end, const Report& report) {
       throw Error(Failure::numerical, partners(queue_.key_of(i), box_) +
                                           " collide without end at one instant; separate the spheres that touch there");
     if (++events_ > report.max_events) throw_too_many_contacts(report.max_events, partners(queue_.key_of(i), box_));
-    if (a.kind == EventKind::wall) {
-      collide_wall(i, now, generation, report);
-      search_.plan(i, now);
-    } else {
+    if (a.kind == EventKind::pair) {
       const Slot j = flights_.packing().slot(a.partner);
       collide_pair(i, j, a.partner, now, generation, report);
       search_.plan_two(i, j, now);
+    } else {
+      meet_alone(i, generation, report);
+      search_.plan(i, now);
     }
     if (report.counters.sphere_sphere >= report.collision_limit || events_ >= report.contact_limit) {
       end = now;
@@ -175,8 +175,8 @@ template <int D>
 void EventCore<D>::begin_trace(Slot i, std::uint32_t partner, std::uint32_t generation, Trace<D>& trace) const {
   const Slot j = flights_.packing().slot(partner);
   const auto [lo, hi] = flights_[i].id < flights_[j].id ? std::pair(i, j) : std::pair(j, i);
-  trace.begin(lo, flights_[lo], hi, flights_[hi], lo == i ? partner : flights_.packing().reversed(i, partner),
-              generation);
+  trace.begin(EventKind::pair, lo, flights_[lo], hi, flights_[hi],
+              lo == i ? partner : flights_.packing().reversed(i, partner), generation);
   if (flights_.rough()) trace.note_spins(flights_.spin(lo), flights_.spin(hi));
 }
 
@@ -200,18 +200,16 @@ void EventCore<D>::collide_pair(Slot i, Slot j, std::uint32_t partner, double ti
 }
 
 template <int D>
-void EventCore<D>::collide_wall(Slot i, double time, std::uint32_t generation, const Report& report) {
+void EventCore<D>::meet_alone(Slot i, std::uint32_t generation, const Report& report) {
   const EventKey<D> key = queue_.key_of(i);
   if (report.trace) {
-    report.trace->begin(i, flights_[i], Trace<D>::kNoEntry, flights_[i], key.hi, generation);
+    report.trace->begin(key.kind, i, flights_[i], Trace<D>::kNoEntry, flights_[i], key.hi, generation);
     if (flights_.rough()) report.trace->note_spins(flights_.spin(i), flights_.spin(i));
   }
-  const Wall<D> wall = box_.wall(key.hi);
-  const Impact<D> impact = flights_.bounce(i, wall, time, generation);
+  const Impact<D> impact = flights_.meet_alone(key, i);
   ++queue_[i].version;
-  if (report.trace)
-    return report.trace->end(flights_[i], flights_[i], {EventKind::wall, impact.exchange}, impact.overlap);
-  report.counters.add_wall(key.hi, impact.exchange);
+  if (report.trace) return report.trace->end(flights_[i], flights_[i], {key.kind, impact.exchange}, impact.overlap);
+  report.counters.add(key.kind, key.hi, impact.exchange);
   report.counters.note_overlap(impact.overlap, [&] { return Overlap(impact.overlap, impact.sigma, key); });
   if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], impact));
 }

@@ -115,7 +115,7 @@ class EventCore {
   /// Records two spheres before their collision; out of line, for the sake of collisions without a trace.
   [[gnu::noinline]] void begin_trace(Slot i, std::uint32_t partner, std::uint32_t generation, Trace<D>& trace) const;
   void collide_pair(Slot i, Slot j, std::uint32_t partner, double time, std::uint32_t generation, const Report& report);
-  void collide_wall(Slot i, double time, std::uint32_t generation, const Report& report);
+  void meet_alone(Slot i, std::uint32_t generation, const Report& report);
 
   const Box<D>& box_;
   const Sizes* sizes_;  // sizes in the larger system; null if there is none

@@ -33,7 +33,7 @@ template <int D>
 EventKey<D> EventQueue<D>::key_of(Slot i) const {
   const NextEvent<D>& a = next_events_[i];
   const Record<D>& r = flights_[i];
-  if (a.kind == EventKind::wall)
+  if (a.kind != EventKind::pair)
     return {.time = a.contact, .generation = generation_of(i), .kind = a.kind, .lo = r.id, .hi = a.partner};
   const Id other = flights_[slot_of(a.partner)].id;
   return pair_key<D>(a.contact, generation_of(i), r.id, other, flights_.packing().image(a.partner));

@@ -89,7 +89,7 @@ class EventQueue {
   std::uint32_t generation_of(Slot i) const {
     const NextEvent<D>& a = next_events_[i];
     const std::uint32_t own = flights_.generation_at(i, a.contact);
-    return a.kind == EventKind::wall ? own : std::max(own, flights_.generation_at(slot_of(a.partner), a.contact));
+    return a.kind == EventKind::pair ? std::max(own, flights_.generation_at(slot_of(a.partner), a.contact)) : own;
   }
   EventKey<D> key_of(Slot i) const;
 

@@ -88,7 +88,7 @@ void EventSearch<D>::foresee(Slot i, double now) {
   ++counts_.predictions;
   queue_[i].contact = kNever;
   scan(listed(i), flights_[i].t == now);
-  if (!flights_.walls().empty()) foresee_walls(i);
+  if (flights_.has_lone_events()) foresee_lone_events(i);
   foresee_update(i, now);
 }
 
@@ -99,7 +99,7 @@ void EventSearch<D>::foresee_in_cells(Slot i, double now) {
   a.contact = kNever;
   const ScanResult first = cells_->scan_around(setting_, i, a.where.cell, flights_[i].t == now, found_);
   plan_found(i, first, found_);
-  if (!flights_.walls().empty()) foresee_walls(i);
+  if (flights_.has_lone_events()) foresee_lone_events(i);
   predict_crossing(a, i, flights_, box_, *cells_, now);
 }
 
@@ -116,7 +116,7 @@ void EventSearch<D>::plan_two_in_cells(Slot i, Slot j, double now) {
   plan_found(i, first, found_);
   plan_found(j, second, others_);
   for (const Slot one : {i, j}) {
-    if (!flights_.walls().empty()) foresee_walls(one);
+    if (flights_.has_lone_events()) foresee_lone_events(one);
     queue_.schedule(one);
   }
 }
@@ -133,7 +133,7 @@ void EventSearch<D>::plan_two(Slot i, Slot j, double now) {
   for (const int k : {0, 1}) {
     const Slot one = task[k].self;
     plan_first(task[k], first[k]);
-    if (!flights_.walls().empty()) foresee_walls(one);
+    if (flights_.has_lone_events()) foresee_lone_events(one);
     foresee_update(one, now);
     queue_.schedule(one);
   }
@@ -160,9 +160,9 @@ void EventSearch<D>::offer_all(const ScanTask& task) {
 }
 
 template <int D>
-void EventSearch<D>::foresee_walls(Slot i) {
-  for (const Wall<D>& wall : flights_.walls())
-    queue_.offer(i, flights_.wall_contact(i, wall), EventKind::wall, wall.number);
+void EventSearch<D>::foresee_lone_events(Slot i) {
+  flights_.visit_lone_events(i, flights_[i],
+                             [&](double time, EventKind kind, Id number) { queue_.offer(i, time, kind, number); });
 }
 
 template <int D>

@@ -70,7 +70,7 @@ class EventSearch {
   void foresee(Slot i, double now);
   void foresee_in_cells(Slot i, double now);
   void plan_two_in_cells(Slot i, Slot j, double now);
-  [[gnu::noinline]] void foresee_walls(Slot i);
+  [[gnu::noinline]] void foresee_lone_events(Slot i);
   void foresee_update(Slot i, double now);
   ScanTask listed(Slot i) const;
   void scan(const ScanTask& task, bool latest);

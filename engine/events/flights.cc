@@ -28,7 +28,7 @@ void Flights<D>::assign(std::span<const Id> order) {
 
 template <int D>
 void Flights<D>::load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth) {
-  set_walls();
+  set_surroundings();
   g_ = g;
   field_ = g != Vec<D>::Zero();
   growth_ = growth;
@@ -48,11 +48,11 @@ void Flights<D>::load(const Particles<D>& particles, const Vec<D>& g, double hor
     for (const Record<D>& r : records_) spins_.push_back(particles.spin[r.id]);
 }
 
-/// The walls of the box, and the kicks of its bath.
 template <int D>
-void Flights<D>::set_walls() {
+void Flights<D>::set_surroundings() {
   walls_ = box_.walls();
-  if (box_.bath.kicks()) walls_.push_back(box_.wall(Bath::kNumber));
+  kicks_ = box_.bath.kicks();
+  lone_events_ = kicks_ || !walls_.empty();
 }
 
 template <int D>
@@ -89,7 +89,7 @@ ScanSetting Flights<D>::setting() const {
 template <int D>
 void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon,
                       std::span<const Spin<D>> spins) {
-  set_walls();
+  set_surroundings();
   g_ = g;
   field_ = g != Vec<D>::Zero();
   growth_ = 0;
@@ -144,7 +144,6 @@ double Flights<D>::pair_contact(Slot i, const Record<D>& a, Slot j, const Record
 template <int D>
 double Flights<D>::wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall) const {
   if (is_fixed(mass(i))) return kNever;
-  if (wall.bath) return wall.bath->next_kick(r.id, box_.time, r.t, horizon_);
   const double at_record = grown(radius(i), r.t), rate = radius(i) * growth_;
   const double slack = approach_slack(1.0, r.v.norm(), rate + std::abs(wall.velocity_at(r.t)));
   const double s = wall_meeting<D>(wall, r.x, r.v, g_, at_record, rate, r.t, horizon_ - r.t, gap_tolerance_(at_record),
@@ -200,17 +199,27 @@ Impact<D> Flights<D>::collide(Slot i, Record<D>& a, Spin<D>* spin_a, Slot j, Rec
 }
 
 template <int D>
-Impact<D> Flights<D>::bounce(Slot i, Record<D>& r, Spin<D>* spin, const Wall<D>& wall, double t,
-                             std::uint32_t generation) const {
+double Flights<D>::next_kick(Slot i, const Record<D>& r) const {
+  return is_fixed(mass(i)) ? kNever : box_.bath.next_kick(r.id, box_.time, r.t, horizon_);
+}
+
+template <int D>
+Impact<D> Flights<D>::meet_alone(const EventKey<D>& key, Slot i, Record<D>& r, Spin<D>* spin) const {
+  const double t = key.time, at_contact = grown(radius(i), t), m = mass(i);
+  const Draw draw{.id = r.id, .time = box_.time + t, .number = key.generation};
   advance(r, t);
-  const double at_contact = grown(radius(i), t), rate = radius(i) * growth_;
-  const auto [after, impulse, exchange] =
-      wall_impulse<D>(laws(), wall, r.v, {mass(i), at_contact, r.species, rough_ ? spin : nullptr},
-                      {.id = r.id, .time = box_.time + t, .number = generation}, t, rate);
+  r.generation = static_cast<std::uint16_t>(key.generation);
+  const Vec<D> before = r.v;
+  if (key.kind == EventKind::kick) {
+    r.v = kicked_velocity<D>(box_.bath, m, draw);
+    const double heat = 0.5 * m * (r.v.squaredNorm() - before.squaredNorm());
+    return {Vec<D>::Zero(), m * (r.v - before), {.heat = heat}, 0, at_contact};
+  }
+  const Wall<D> wall = box_.wall(key.hi);
+  const auto [after, impulse, exchange] = wall_impulse<D>(
+      laws(), wall, before, {m, at_contact, r.species, rough_ ? spin : nullptr}, draw, t, radius(i) * growth_);
   r.v = after;
-  r.generation = static_cast<std::uint16_t>(generation);
-  const double overlap = wall.bath ? 0 : -wall.gap(r.x, at_contact, t) / at_contact;
-  return {r.x - wall.foot(r.x, t), impulse, exchange, overlap, at_contact};
+  return {r.x - wall.foot(r.x, t), impulse, exchange, -wall.gap(r.x, at_contact, t) / at_contact, at_contact};
 }
 
 template <int D>
@@ -224,7 +233,8 @@ Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& a, co
 template <int D>
 Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& r, const Impact<D>& impact) const {
   const auto& [d, impulse, exchange, overlap, sigma] = impact;
-  return {key, r.x, box_.wall(key.hi).foot(r.x, key.time), impulse, exchange, overlap, sigma, r.v};
+  const Vec<D> touched = key.kind == EventKind::wall ? box_.wall(key.hi).foot(r.x, key.time) : r.x;
+  return {key, r.x, touched, impulse, exchange, overlap, sigma, r.v};
 }
 
 template class Flights<2>;

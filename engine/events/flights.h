@@ -90,8 +90,6 @@ class Flights {
   double pair_contact(Slot i, Slot j, const Vec<D>& shift) const {
     return pair_contact(i, records_[i], j, records_[j], shift);
   }
-  /// The time at which a sphere touches a wall. Throws Error(Failure::numerical) if it rests there under the field.
-  double wall_contact(Slot i, const Wall<D>& wall) const { return wall_contact(i, records_[i], wall); }
 
   /// Executes the collision of two spheres at time t.
   Impact<D> collide(Slot i, Slot j, const Vec<D>& shift, double t, std::uint32_t generation) {
@@ -99,17 +97,11 @@ class Flights {
       return collide(i, records_[i], &spins_[i], j, records_[j], &spins_[j], shift, t, generation);
     return collide_smooth(i, records_[i], j, records_[j], shift, t, generation);
   }
-  /// Executes the collision of a sphere with a wall at time t; the second "centre" is the point touched.
-  Impact<D> bounce(Slot i, const Wall<D>& wall, double t, std::uint32_t generation) {
-    return bounce(i, records_[i], rough_ ? &spins_[i] : nullptr, wall, t, generation);
-  }
 
   // The functions above for records other than the present ones. Spins, which change, matter for rough contacts only.
   double pair_contact(Slot i, const Record<D>& a, Slot j, const Record<D>& b, const Vec<D>& shift) const;
-  double wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall) const;
   Impact<D> collide(Slot i, Record<D>& a, Spin<D>* spin_a, Slot j, Record<D>& b, Spin<D>* spin_b, const Vec<D>& shift,
                     double t, std::uint32_t generation) const;
-  Impact<D> bounce(Slot i, Record<D>& r, Spin<D>* spin, const Wall<D>& wall, double t, std::uint32_t generation) const;
 
   void set(Slot i, const Record<D>& r, const Spin<D>& spin) {
     records_[i] = r;
@@ -118,12 +110,25 @@ class Flights {
   /// Stores a sphere in slot `i`, an existing one or the next.
   void admit(Slot i, const Record<D>& r, double radius, double mass, const Spin<D>& spin);
 
-  /// The contact reported to observers after a collision of two spheres, or of a sphere with a wall.
+  /// The contact reported to observers after a collision of two spheres, or after a lone event.
   Contact<D> contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
                         const Impact<D>& impact) const;
   Contact<D> contact_of(const EventKey<D>& key, const Record<D>& r, const Impact<D>& impact) const;
 
-  std::span<const Wall<D>> walls() const { return walls_; }
+  // Lone events are the events of one sphere without a partner: contacts with walls and kicks by a bath.
+  bool has_lone_events() const { return lone_events_; }
+  /// Calls visit(time, kind, number of the wall) with the next event of each kind and each wall that a sphere with this
+  /// record has; the time is infinite if there is none.
+  template <class Visit>
+  void visit_lone_events(Slot i, const Record<D>& r, Visit&& visit) const {
+    for (const Wall<D>& wall : walls_) visit(wall_contact(i, r, wall), EventKind::wall, wall.number);
+    if (kicks_) visit(next_kick(i, r), EventKind::kick, Id{0});
+  }
+  /// Executes a lone event; the second "centre" is the point of the wall that is touched.
+  Impact<D> meet_alone(const EventKey<D>& key, Slot i, Record<D>& r, Spin<D>* spin) const;
+  Impact<D> meet_alone(const EventKey<D>& key, Slot i) {
+    return meet_alone(key, i, records_[i], rough_ ? &spins_[i] : nullptr);
+  }
 
   /// The contact distance of two spheres at time 0; the radius of one [length].
   double contact_distance(Slot i, Slot j) const { return radius(i) + radius(j); }
@@ -138,7 +143,10 @@ class Flights {
                          const Vec<D>& shift, double t, std::uint32_t generation) const;
   Impact<D> collide_smooth(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
                            std::uint32_t generation) const;
-  void set_walls();
+  void set_surroundings();
+  /// The time at which a sphere touches a wall. Throws Error(Failure::numerical) if it rests there under the field.
+  double wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall) const;
+  double next_kick(Slot i, const Record<D>& r) const;
   [[gnu::always_inline]] void advance(Record<D>& r, double t) const {
     const double s = t - r.t;
     if (s != 0) {
@@ -159,7 +167,7 @@ class Flights {
   ContactLaws elastic_;
   std::vector<Wall<D>> walls_;
   Vec<D> g_ = Vec<D>::Zero();
-  bool field_ = false, rough_ = false;
+  bool field_ = false, rough_ = false, kicks_ = false, lone_events_ = false;
   double growth_ = 0, horizon_ = 0;
   GapTolerance gap_tolerance_;
   PageVector<Record<D>> records_;  // by slot

@@ -17,24 +17,40 @@ std::uint64_t mixed(std::uint64_t z) {
   return z ^ z >> 31;
 }
 
+/// A contact or kick uses at most four blocks.
+RandomStream stream_of(std::uint64_t seed, RandomPurpose purpose, const Draw& draw) {
+  const std::uint64_t event = mixed(mixed(std::bit_cast<std::uint64_t>(draw.time)) + draw.number);
+  return {seed, purpose, draw.id, event >> 4 << 2};
+}
+
+template <int D>
+Vec<D> normal_velocity(double speed, RandomStream& random) {
+  const auto one = random.normal_pair(), two = random.normal_pair();
+  Vec<D> v;
+  for (int k = 0; k < D; ++k) v[k] = speed * (k < 2 ? one[k] : two[0]);
+  return v;
+}
+
 }  // namespace
 
 template <int D>
 Vec<D> thermal_velocity(const Wall<D>& wall, double mass, const Draw& draw, double t) {
-  const std::uint64_t event = mixed(mixed(std::bit_cast<std::uint64_t>(draw.time)) + draw.number);
-  RandomStream random(wall.seed, wall.bath ? RandomPurpose::kick : RandomPurpose::thermal_wall, draw.id,
-                      event >> 4 << 2);  // a contact uses at most four blocks
-  const double temperature = wall.bath ? wall.bath->temperature_at(draw.time) : wall.temperature;
-  const double speed = std::sqrt(temperature / mass);
-  const auto one = random.normal_pair(), two = random.normal_pair();
-  Vec<D> v;
-  for (int k = 0; k < D; ++k) v[k] = speed * (k < 2 ? one[k] : two[0]);
-  if (wall.bath) return v;
+  RandomStream random = stream_of(wall.seed, RandomPurpose::thermal_wall, draw);
+  const double speed = std::sqrt(wall.temperature / mass);
+  const Vec<D> v = normal_velocity<D>(speed, random);
   const double away = speed * std::sqrt(-2 * elementary::log(random.uniform()));
   return v + (wall.velocity_at(t) + away - wall.along_normal(v)) * wall.normal;
 }
 
+template <int D>
+Vec<D> kicked_velocity(const Bath& bath, double mass, const Draw& draw) {
+  RandomStream random = stream_of(bath.seed, RandomPurpose::kick, draw);
+  return normal_velocity<D>(std::sqrt(bath.temperature_at(draw.time) / mass), random);
+}
+
 template Vec<2> thermal_velocity(const Wall<2>&, double, const Draw&, double);
 template Vec<3> thermal_velocity(const Wall<3>&, double, const Draw&, double);
+template Vec<2> kicked_velocity(const Bath&, double, const Draw&);
+template Vec<3> kicked_velocity(const Bath&, double, const Draw&);
 
 }  // namespace carom

@@ -17,8 +17,12 @@ struct Draw {
   std::uint64_t number = 0;  ///< tells the contacts of a particle apart that have the same `time`
 };
 
-/// The velocity of a particle after a contact or kick.
+/// The velocity of a particle after a contact with a thermal wall.
 template <int D>
 Vec<D> thermal_velocity(const Wall<D>& wall, double mass, const Draw& draw, double t);
+
+/// The velocity of a particle after a kick.
+template <int D>
+Vec<D> kicked_velocity(const Bath& bath, double mass, const Draw& draw);
 
 }  // namespace carom

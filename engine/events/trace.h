@@ -24,10 +24,10 @@ struct Node {
   EventKey<D> key{};
   Spin<D> spin = Spin<D>::Zero();  ///< of the sphere after the event; 0 if no contact is rough
 
-  /// The other sphere's id; kNoPartner at a wall.
+  /// The other sphere's id; kNoPartner in a lone event.
   static constexpr Id kNoPartner = std::numeric_limits<Id>::max();
   Id partner() const {
-    if (key.kind == EventKind::wall) return kNoPartner;
+    if (key.kind != EventKind::pair) return kNoPartner;
     return key.lo == after.id ? key.hi : key.lo;
   }
 };
@@ -51,9 +51,10 @@ class Trace {
   struct Event {
     double time, overlap;
     PackedExchange exchange;
-    std::uint32_t generation;
+    std::uint16_t generation;
+    EventKind kind;
     std::uint32_t partner;  ///< the partner of the first sphere, as in NextEvent
-    Slot slot[2];           ///< kNoEntry: a wall
+    Slot slot[2];           ///< the second one is kNoEntry in a lone event
     std::uint32_t last[2];  ///< the sphere's entry in its previous event, or kNoEntry
   };
   // Sphere k of an event, k = 0 or 1, has the entry number 2·event + k.
@@ -73,10 +74,12 @@ class Trace {
   }
 
   /// Call before an event of sphere `i`, and of sphere `j` unless `j` is kNoEntry.
-  void begin(Slot i, const Record<D>& a, Slot j, const Record<D>& b, std::uint32_t partner, std::uint32_t generation) {
+  void begin(EventKind kind, Slot i, const Record<D>& a, Slot j, const Record<D>& b, std::uint32_t partner,
+             std::uint32_t generation) {
     if (size_ == events_.size()) grow();
     Event& event = events_[size_];
-    event.generation = generation;
+    event.generation = static_cast<std::uint16_t>(generation);
+    event.kind = kind;
     event.partner = partner;
     event.slot[0] = i;
     event.slot[1] = j;

@@ -48,9 +48,9 @@ template <int D>
 EventKey<D> WindowPaths<D>::key_of(std::uint32_t entry) const {
   const auto& event = trace_.event_of(entry);
   const Id lo = trace_.before(entry / 2 * 2).id, hi = trace_.before(entry / 2 * 2 + 1).id;
-  return event.slot[1] == kNoEntry
-             ? EventKey<D>{event.time, event.generation, EventKind::wall, lo, event.partner}
-             : pair_key<D>(event.time, event.generation, lo, hi, flights_.packing().image(event.partner));
+  return event.kind == EventKind::pair
+             ? pair_key<D>(event.time, event.generation, lo, hi, flights_.packing().image(event.partner))
+             : EventKey<D>{event.time, event.generation, event.kind, lo, event.partner};
 }
 
 /// Node k of a path, read from the log; `entries`: the sphere's entries.
@@ -127,13 +127,8 @@ ContactTally WindowPaths<D>::tally() const {
     const auto& event = trace_.events()[n];
     const Slot lo = event.slot[0], hi = event.slot[1];  // clang 14 cannot capture a structured binding
     if (!ownership_.owns(lo) || paths_.has(lo)) continue;
-    const bool pair = hi != kNoEntry;
-    if (pair) {
-      tally.add_pair(event.exchange.template unpacked<D>(nullptr, event.time));
-    } else {
-      const Wall<D> wall = box_.wall(event.partner);
-      tally.add_wall(wall.number, event.exchange.unpacked(&wall, event.time));
-    }
+    const bool pair = event.kind == EventKind::pair;
+    tally.add(event.kind, event.partner, event.exchange.unpacked(event.kind, event.partner, box_, event.time));
     tally.note_overlap(event.overlap, [&] {
       return Overlap(event.overlap, pair ? flights_.contact_distance(lo, hi) : flights_.radius(lo), key_of(2 * n));
     });
@@ -152,8 +147,8 @@ Contact<D> WindowPaths<D>::contact_of(Slot lo, std::size_t k) const {
   const View path = view(lo);
   const EventKey<D> key = path.node(k).key;
   Node<D> a = path.node(k - 1);
-  if (key.kind == EventKind::wall) {
-    const Impact<D> impact = flights_.bounce(lo, a.after, &a.spin, box_.wall(key.hi), key.time, key.generation);
+  if (key.kind != EventKind::pair) {
+    const Impact<D> impact = flights_.meet_alone(key, lo, a.after, &a.spin);
     return flights_.contact_of(key, a.after, impact);
   }
   const Slot hi = ownership_.slot_of(key.hi);

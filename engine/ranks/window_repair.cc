@@ -61,7 +61,7 @@ typename WindowRepair<D>::Repaired& WindowRepair<D>::begin(Slot i, const EventKe
   m.version = 1;
   m.old = path;
   for (auto node = from; node != path.end(); ++node) {
-    if (node->key.kind == EventKind::wall) continue;
+    if (node->key.kind != EventKind::pair) continue;
     const Slot partner = ownership_.slot_of(node->partner());
     if (partner != IdTable::kNowhere && (ownership_.owns(i) || ownership_.owns(partner)))
       tasks_.push({.kind = Task::Kind::difference, .key = node->key, .a = partner});
@@ -143,15 +143,12 @@ void WindowRepair<D>::predict(const Repaired& m, const EventKey<D>& now) {
                        .image = image});
       }))
     return;
-  for (const Wall<D>& wall : flights_.walls()) {
-    const double t = flights_.wall_contact(m.slot, r, wall);
-    if (!(t < end_)) continue;
+  flights_.visit_lone_events(m.slot, r, [&](double t, EventKind kind, Id number) {
+    if (!(t < end_)) return;
     const std::uint32_t generation = Flights<D>::generation_at(r, t);
-    tasks_.push({.kind = Task::Kind::contact,
-                 .key = {t, generation, EventKind::wall, r.id, wall.number},
-                 .a = m.slot,
-                 .version_a = m.version});
-  }
+    tasks_.push(
+        {.kind = Task::Kind::contact, .key = {t, generation, kind, r.id, number}, .a = m.slot, .version_a = m.version});
+  });
 }
 
 /// Whether sphere `i`, if it has record r from `now` on, meets another one in the window, and the contact.
@@ -186,7 +183,7 @@ void WindowRepair<D>::contact(const Task& task) {
   Node<D> of_a = paths_.path(task.a).back();
   of_a.key = key;
   if (!pair) {
-    flights_.bounce(task.a, of_a.after, &of_a.spin, box_.wall(key.hi), key.time, key.generation);
+    flights_.meet_alone(key, task.a, of_a.after, &of_a.spin);
     append(a, of_a);
     return predict(a, key);
   }
@@ -211,7 +208,7 @@ void WindowRepair<D>::append(Repaired& m, const Node<D>& node) {
   plan_script(m);
 }
 
-/// Executes a script event of a ghost with another ghost or a wall.
+/// Executes a script event of a ghost, alone or with another ghost.
 template <int D>
 void WindowRepair<D>::script(const Task& task) {
   Repaired& m = repairs_.at(task.a);

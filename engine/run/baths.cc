@@ -70,7 +70,6 @@ void rescale(System<D>& system, std::int64_t slab, double time, double length, C
 
 template <int D>
 void kick_all(System<D>& system, double start, double length, Counters& counters) {
-  const Wall<D> source = system.box.wall(Bath::kNumber);
   const Bath& bath = system.box.bath;
   auto& p = system.particles;
   std::vector<double> gained(p.size(), 0.0);
@@ -83,7 +82,7 @@ void kick_all(System<D>& system, double start, double length, Counters& counters
       if (p.owns(i)) ++kicks;
     if (last == 0) continue;
     const double before = p.v[i].squaredNorm();
-    p.v[i] = thermal_velocity(source, p.mass[i], {.id = id, .time = start + last}, 0);
+    p.v[i] = kicked_velocity<D>(bath, p.mass[i], {.id = id, .time = start + last});
     gained[i] = 0.5 * p.mass[i] * (p.v[i].squaredNorm() - before);
   }
   system.decomposition.ranks().sum({&kicks, 1});

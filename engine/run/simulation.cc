@@ -251,7 +251,7 @@ void Simulation<D>::run(const Hooks& hooks) {
     if (!contacts_needed_) return;
     const Stopwatch stopwatch(s.counters.seconds.output);
     if (system_->box.bath.kicks())
-      std::erase_if(contacts, [](const auto& each) { return each.key.hi == Bath::kNumber; });
+      std::erase_if(contacts, [](const auto& each) { return each.key.kind == EventKind::kick; });
     for (auto& contact : contacts) contact.key.time += count_.within;
     for (auto* observer : observers_) observer->contacts(time_of(slab.index), contacts);
     contacts.clear();

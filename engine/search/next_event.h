@@ -28,7 +28,7 @@ struct alignas(64) NextEvent {
     double centre[D];   ///< centre of the region: the sphere's position when its list was made
     CellPlace<D> cell;  ///< if the core uses cells alone
   } where{};
-  std::uint32_t partner = 0;          ///< as a candidate (Packing); for a wall, its number
+  std::uint32_t partner = 0;          ///< as a candidate (Packing); for a wall, its number; for a kick, 0
   std::uint32_t partner_version = 0;  ///< the contact is stale if the partner's version is newer
   std::uint32_t version = 0;          ///< increases with every contact of the sphere
   std::uint32_t list = 0;             ///< start of its list, in units of kScanLanes candidates

@@ -167,9 +167,8 @@ TEST(Baths, AKickHasTheTemperatureOfItsTime) {
   const Bath ramp{
       .type = Bath::Type::andersen, .temperature = 1, .last_temperature = 9, .ramp_start = 2, .ramp_end = 6};
   const Bath constant{.type = Bath::Type::andersen, .temperature = 5, .last_temperature = 5};
-  const Wall<3> rising{.bath = &ramp}, same{.bath = &constant};
   const Draw draw{.id = 5, .time = 4, .number = 1};
-  EXPECT_EQ(thermal_velocity(rising, 0.5, draw, 0.25), thermal_velocity(same, 0.5, draw, 0.25));
+  EXPECT_EQ(kicked_velocity<3>(ramp, 0.5, draw), kicked_velocity<3>(constant, 0.5, draw));
 }
 
 /// A relaxation time far below the slab draws each kinetic energy afresh: its mean and variance are those of the four

@@ -49,7 +49,7 @@ struct Searched {
   /// contact before the next events of both spheres. Returns the first contact.
   double expect_planned(Slot i) const {
     double first = kNever, seen = kNever;
-    for (const Wall<D>& wall : flights.walls()) first = std::min(first, flights.wall_contact(i, wall));
+    flights.visit_lone_events(i, flights[i], [&](double time, EventKind, Id) { first = std::min(first, time); });
     seen = first;
     for_all_others(i, [&](Slot j, const Image<D>& image) {
       const double time = flights.pair_contact(i, j, system->box.shift(image));
@@ -67,7 +67,7 @@ struct Searched {
   double first_contact() const {
     double first = kNever;
     for (Slot i = 0; i < flights.size(); ++i) {
-      for (const Wall<D>& wall : flights.walls()) first = std::min(first, flights.wall_contact(i, wall));
+      flights.visit_lone_events(i, flights[i], [&](double time, EventKind, Id) { first = std::min(first, time); });
       for_all_others(i, [&](Slot j, const Image<D>& image) {
         if (i < j) first = std::min(first, flights.pair_contact(i, j, system->box.shift(image)));
       });
@@ -130,7 +130,7 @@ void expect_contacts(Searched<D>& s, int contacts) {
       --contacts;
       ++s.queue[i].version;
       if (a.kind == EventKind::wall) {
-        s.flights.bounce(i, s.system->box.wall(a.partner), now, 0);
+        s.flights.meet_alone({.time = now, .kind = a.kind, .lo = s.flights[i].id, .hi = a.partner}, i);
         s.search.plan(i, now);
       } else {
         const Slot j = s.flights.packing().slot(a.partner);
