@@ -84,6 +84,11 @@ struct IntegratorInfo {
   std::unique_ptr<Integrator<2>> (*in_2d)(const Parameters&) = nullptr;
   std::unique_ptr<Integrator<3>> (*in_3d)(const Parameters&) = nullptr;
 
+  /// Why the method cannot run with this interaction, as "what is wrong; what to do"; empty if it can. `fixed`: whether
+  /// some particles are fixed.
+  template <int D>
+  std::string refusal(const Interaction<D>& term, bool fixed) const;
+
   template <int D>
   std::unique_ptr<Integrator<D>> make(const Parameters& p) const {
     if constexpr (D == 2)

@@ -11,6 +11,21 @@ const std::vector<IntegratorInfo>& integrators() {
   return all;
 }
 
+template <int D>
+std::string IntegratorInfo::refusal(const Interaction<D>& term, bool fixed) const {
+  if (smooth_forces) return "";
+  if (!term.common_acceleration())
+    return std::string(name) +
+           " knows no forces but a uniform-field; leave the interaction out, or take psa, edda or their relatives";
+  if (!fixed) return "";
+  return std::string(name) +
+         " knows no fixed particles in a uniform-field, where all particles have the same acceleration; leave the "
+         "field "
+         "out, let all particles move, or take psa, edda or their relatives";
+}
+template std::string IntegratorInfo::refusal(const Interaction<2>&, bool) const;
+template std::string IntegratorInfo::refusal(const Interaction<3>&, bool) const;
+
 const IntegratorInfo& find_integrator(std::string_view name) { return find_named(integrators(), "integrator", name); }
 
 namespace parameter {

@@ -88,17 +88,6 @@ void check_rest_speeds(const System<D>& system) {
                                      short_text(thermal) + "; give a smaller one, or none");
 }
 
-template <int D>
-void check_fixed(const System<D>& system, const IntegratorInfo& info) {
-  if (!system.has_fixed()) return;
-  if (system.moving() == 0)
-    throw Error(Failure::deck, "all particles are fixed and nothing would move; give some a finite mass");
-  if (!info.smooth_forces && !system.interactions.empty())
-    throw Error(Failure::deck, std::string(info.name) +
-                                   " knows no fixed particles in a uniform-field, where all particles have the same "
-                                   "acceleration; take psa, edda or their relatives");
-}
-
 /// Throws if the bath kicks, or a wall oscillates, too often for the slab.
 template <int D>
 void check_rates(const Box<D>& box, const Slab& slab, bool stepping) {
@@ -147,11 +136,7 @@ Simulation<D>::Simulation(std::unique_ptr<System<D>>&& system, const IntegratorI
 template <int D>
 typename Simulation<D>::Prepared Simulation<D>::prepare(const System<D>& system, const IntegratorInfo& info,
                                                         Parameters given, Plan plan) {
-  const std::string name(info.name);
   system.check();
-  for (const auto& term : system.interactions)
-    if (!info.smooth_forces && !term->common_acceleration())
-      throw Error(Failure::deck, name + " knows no forces but a uniform-field; take psa, edda or their relatives");
   if (info.hard_cores) check_spheres(system);
   if (plan.step != 0 && given.has("step"))
     throw Error(Failure::deck, "the step is given twice; give it with the plan or with the integrator, not with both");
@@ -195,7 +180,10 @@ void Simulation<D>::begin(const Hooks& hooks) {
   if (!again) {
     system_->need_spins();
     system_->count_moving();
-    check_fixed(*system_, info_);
+    if (system_->moving() == 0 && system_->has_fixed())
+      throw Error(Failure::deck, "all particles are fixed and nothing would move; give some a finite mass");
+    for (const auto& term : system_->interactions)
+      if (const auto no = info_.refusal(*term, system_->has_fixed()); !no.empty()) throw Error(Failure::deck, no);
     if (!hooks.restore) check_rest_speeds(*system_);
     if (info_.smooth_forces) {
       system_->quanta = quanta(*system_);

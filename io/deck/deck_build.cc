@@ -175,23 +175,15 @@ void make_interactions(const Deck::Source& source, System<D>& system, bool place
     return config.info->kind == InteractionInfo::Kind::bonded;
   };
   std::vector<std::unique_ptr<Interaction<D>>> terms(source.interactions.size());
+  const bool fixed = std::ranges::any_of(source.species, &SpeciesConfig::fixed);
   const auto make = [&](std::size_t n) {
     const InteractionConfig& config = source.interactions[n];
     if (config.wrong) return;
     try {
       auto term = config.info->make<D>(config.parameters, context);
-      if (source.integrator != nullptr && !source.integrator->smooth_forces &&
-          std::ranges::any_of(source.species, &SpeciesConfig::fixed))
-        problems.error(config.at,
-                       std::string(source.integrator->name) +
-                           " knows no fixed particles in a uniform-field, where all have the same acceleration",
-                       "leave the field out, let all particles move, or take psa, edda or their relatives");
-      if (source.integrator != nullptr && !source.integrator->smooth_forces && term->common_acceleration() == nullptr)
-        problems.error(config.at,
-                       std::string(source.integrator->name) + " cannot carry the interaction '" +
-                           std::string(config.info->name) + "'",
-                       "it knows no forces but a uniform-field; leave the interaction out, or take psa, edda or "
-                       "their relatives");
+      if (source.integrator != nullptr)
+        if (const std::string no = source.integrator->refusal(*term, fixed); !no.empty())
+          throw Error(Failure::deck, no);
       terms[n] = std::move(term);
     } catch (const Error& e) {  // the message of e has the form "what; what to do"
       const std::string message = e.what();

@@ -218,7 +218,7 @@ DECK_ERRORS = {
         17, ["gravity", "periodic", "boundaries"]),
     "forces in free flight": (
         changed("[integrator]", '[[interaction]]\ntype = "wca"\nepsilon = 1\nsigma = 1\n[integrator]', FLUID),
-        17, ["free-flight cannot carry the interaction 'wca'", "uniform-field"]),
+        17, ["free-flight knows no forces but a uniform-field", "leave the interaction out"]),
     "the cut of earlier versions": (
         lennard_jones('cutoff = 2\ncut = "smooth"'), 22, ["'cut' can no longer be 'smooth'", 'write cut = "switch"']),
     "unknown cut": (lennard_jones('cutoff = 2\ncut = "swicth"'), 22, ["'cut' cannot be 'swicth'", "did you mean 'switch'?"]),

@@ -201,7 +201,7 @@ def test_the_checkpoint_before(half, tmp_path):
     (["interaction.2.within=1.5"], 2, "--set interaction.2.within: error"),
     (["integrator.stpe=0.1"], 2, "--set integrator.stpe: error: unknown key"),
     (["integrator.type=rk4"], 2, "unknown integrator 'rk4'"),
-    (["integrator.type=free-flight"], 2, "free-flight cannot carry the interaction"),
+    (["integrator.type=free-flight"], 2, "free-flight knows no forces but a uniform-field"),
     ([], 2, "run.steps = 30: the branch starts at step 30"),
     (["run.steps=100", "run.end_time=0.5"], 2, "run.end_time = 0.5: the branch starts at step 30, time 0.6"),
 ])
