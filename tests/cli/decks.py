@@ -61,7 +61,7 @@ collisions = 10
 
 
 def carom(*arguments, cwd=None):
-    return subprocess.run([CAROM, *arguments], capture_output=True, text=True, timeout=60, cwd=cwd)
+    return subprocess.run([CAROM, *arguments], capture_output=True, text=True, timeout=600, cwd=cwd)
 
 
 def validate(tmp_path, text, *arguments):

@@ -22,7 +22,7 @@ def go_on(output, arguments=(), code=0, ranks=1, environment=None):
     what = [CAROM, "run", "--continue", str(output), "--quiet", *arguments]
     if ranks > 1:
         return mpirun(ranks, what, code)
-    done = subprocess.run(what, capture_output=True, text=True, timeout=120, env=environment)
+    done = subprocess.run(what, capture_output=True, text=True, timeout=1200, env=environment)
     assert done.returncode == code, done.stderr
     return done
 

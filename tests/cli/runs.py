@@ -31,7 +31,7 @@ def in_mount(options, target, arguments, keep=None):
     script = 'mount -t tmpfs -o "$1" none "$2"; keep="$3"; target="$2"; shift 3; "$@"; code=$?; '
     script += 'if [ -n "$keep" ]; then cp -r "$target" "$keep"; fi; exit $code'
     return subprocess.run(UNSHARE + ["sh", "-c", script, "sh", options, str(target), str(keep or ""), *arguments],
-                          capture_output=True, text=True, timeout=120)
+                          capture_output=True, text=True, timeout=1200)
 
 
 # Four discs joined by springs between hard walls: smooth forces, pair and wall collisions.
@@ -103,7 +103,7 @@ def mpi_environment():
     return os.environ | dict(settings)
 
 
-MPIRUN = ["timeout", "-k", "10", "120", "mpirun", "--timeout", "100", "-n"]
+MPIRUN = ["timeout", "-k", "10", "1200", "mpirun", "--timeout", "1000", "-n"]
 
 
 def mpirun(ranks, arguments, code=0, **options):
@@ -163,7 +163,7 @@ def command(deck, output, overrides=(), arguments=("--quiet",)):
 
 
 def run(deck, output, overrides=(), arguments=("--quiet",), code=0, **options):
-    done = subprocess.run(command(deck, output, overrides, arguments), capture_output=True, text=True, timeout=120,
+    done = subprocess.run(command(deck, output, overrides, arguments), capture_output=True, text=True, timeout=1200,
                           **options)
     assert done.returncode == code, done.stderr
     return done

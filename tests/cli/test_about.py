@@ -15,14 +15,14 @@ pytestmark = needs_carom
 @pytest.fixture(scope="module")
 def about(tmp_path_factory):
     folder = tmp_path_factory.mktemp("about")
-    subprocess.run([sys.executable, ROOT / "cmake" / "about.py", CAROM, folder], check=True, timeout=120)
+    subprocess.run([sys.executable, ROOT / "cmake" / "about.py", CAROM, folder], check=True, timeout=1200)
     return folder
 
 
 def complete(about, *words):
     """The completions of bash for the last word."""
     script = f'. {about}/carom.bash; compopt() {{ :; }}; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _carom; echo "${{COMPREPLY[*]}}"'
-    done = subprocess.run(["bash", "-c", script, "bash", *words], capture_output=True, text=True, timeout=60)
+    done = subprocess.run(["bash", "-c", script, "bash", *words], capture_output=True, text=True, timeout=600)
     assert done.returncode == 0 and not done.stderr, done.stderr
     return done.stdout.split()
 
@@ -41,7 +41,7 @@ def test_every_option_stands_everywhere(about):
     pages[0] = pages[0].replace("\\-", "-")
     pages[3] = re.sub(r" -l (\S+)", r" --\1", pages[3])
     for command in ("run", "branch", "validate", "schema", "info", "convert", "view", "demo"):
-        text = subprocess.run([CAROM, command, "--help"], capture_output=True, text=True, timeout=60).stdout
+        text = subprocess.run([CAROM, command, "--help"], capture_output=True, text=True, timeout=600).stdout
         options = re.findall(r"^  (?:-\w,)?(--[a-z-]+)", text, re.MULTILINE)
         assert "--help" in options
         for page in pages:
@@ -61,6 +61,6 @@ def test_the_manual_page_has_all_parts(about):
 @pytest.mark.parametrize("former, instead", [("bench", "carom_bench"), ("manual", "man carom"), ("completion", "installed")])
 def test_former_commands_say_what_to_do_instead(former, instead):
     for more in ([], ["--n", "1000"], ["zsh"], ["--help"]):
-        done = subprocess.run([CAROM, former, *more], capture_output=True, text=True, timeout=60)
+        done = subprocess.run([CAROM, former, *more], capture_output=True, text=True, timeout=600)
         assert done.returncode == 2 and instead in done.stderr and not done.stdout
-    assert former not in subprocess.run([CAROM, "--help"], capture_output=True, text=True, timeout=60).stdout
+    assert former not in subprocess.run([CAROM, "--help"], capture_output=True, text=True, timeout=600).stdout

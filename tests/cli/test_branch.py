@@ -23,7 +23,7 @@ def branch(start, output, overrides=(), code=0, ranks=1, arguments=()):
     what = [CAROM, "branch", str(start), "-o", str(output), "--quiet", *sets, *arguments]
     if ranks > 1:
         return mpirun(ranks, what, code)
-    done = subprocess.run(what, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(what, capture_output=True, text=True, timeout=1200)
     assert done.returncode == code, done.stderr
     return done
 

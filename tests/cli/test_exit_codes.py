@@ -81,7 +81,7 @@ def test_file_size_limit(tmp_path):
     limited = ["sh", "-c", 'ulimit -f 20000; exec "$@"', "sh"]  # blocks of 512 bytes
     done = subprocess.run(limited + command(deck, out, ["run.end_time=100000.0", "output.frame_interval=0.05",
                                                         "output.thermo_interval=0.05"]),
-                          capture_output=True, text=True, timeout=120)
+                          capture_output=True, text=True, timeout=1200)
     assert done.returncode == 5, (done.returncode, done.stderr)
     assert "trajectory.h5md" in done.stderr and "File too large" in done.stderr
     assert frames_are_sound(out) > 20
@@ -192,7 +192,7 @@ def test_a_directory_that_is_removed(checkpoints, ranks, killer, tmp_path):
     assert (out / "checkpoint.h5").exists() == (checkpoints != "\"\"")
     shutil.rmtree(out)
     os.kill(process, signal.SIGCONT)
-    error = job.communicate(timeout=60)[1]
+    error = job.communicate(timeout=600)[1]
     assert job.returncode == 5, error
     assert str(out) in error and "No such file or directory" in error
     assert not out.exists()

@@ -79,7 +79,7 @@ def test_signals(method, number, tmp_path):
     wait_for_rows(job, out, 1)
     wait_until_computed(job, 0.1)
     job.send_signal(getattr(signal, "SIG" + number))
-    assert job.wait(60) == INTERRUPTED, job.stderr.read()
+    assert job.wait(600) == INTERRUPTED, job.stderr.read()
     expect_interrupted(out)
 
 
@@ -91,7 +91,7 @@ def test_signals_to_mpirun(method, tmp_path):
     wait_for_rows(job, out, 1)
     time.sleep(0.2)
     job.send_signal(signal.SIGUSR2)
-    assert job.wait(60) == INTERRUPTED, job.stderr.read()
+    assert job.wait(600) == INTERRUPTED, job.stderr.read()
     expect_interrupted(out)
 
 
@@ -104,7 +104,7 @@ def test_going_on_from_within_a_step(method, before, after, tmp_path):
     job = subprocess.Popen(launcher + command(deck, out, [*overrides, "run.steps=1000000"]), env=mpi_environment(), stderr=subprocess.PIPE, text=True)
     wait_for_rows(job, out, 1)
     job.send_signal(signal.SIGUSR2)
-    assert job.wait(60) == INTERRUPTED, job.stderr.read()
+    assert job.wait(600) == INTERRUPTED, job.stderr.read()
     end = f"run.steps={summary(out)['steps'] + 1}"
     run(deck, whole, [*overrides, end])
     go_on(out, ["--set", end], ranks=after)
@@ -121,5 +121,5 @@ def test_a_checkpoint_waits_for_the_end_of_the_step(tmp_path):
     wait_until_computed(job, 0.2)
     assert not (out / "checkpoint.h5").exists()
     job.send_signal(signal.SIGUSR2)
-    assert job.wait(60) == INTERRUPTED, job.stderr.read()
+    assert job.wait(600) == INTERRUPTED, job.stderr.read()
     assert (out / "checkpoint.h5").exists() and not (out / "checkpoint.previous.h5").exists()

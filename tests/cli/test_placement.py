@@ -73,7 +73,7 @@ def test_discs_between_walls(tmp_path):
 
 def validate(deck, overrides):
     sets = [part for override in overrides for part in ("--set", override)]
-    return subprocess.run([CAROM, "validate", str(deck), *sets], capture_output=True, text=True, timeout=120)
+    return subprocess.run([CAROM, "validate", str(deck), *sets], capture_output=True, text=True, timeout=1200)
 
 
 @pytest.mark.parametrize("overrides, words", [
@@ -172,7 +172,7 @@ def test_a_signal_ends_a_placement(overrides, tmp_path):
             while not handles(process, signal.SIGTERM):
                 time.sleep(0.01)
             process.terminate()
-            said = process.communicate(timeout=100)[1]
+            said = process.communicate(timeout=1000)[1]
         finally:
             process.kill()
     assert process.returncode == 75 and said.endswith(STOPPED.format("SIGTERM")) and not (tmp_path / "out").exists()

@@ -175,7 +175,7 @@ def test_a_killed_rank(tmp_path):
     out = tmp_path / "out"
     job = start(3, command(write_deck(tmp_path, SPHERES), out, ENDLESS))
     os.kill(when_it_runs(job, out)[1], signal.SIGKILL)
-    errors = job.communicate(timeout=60)[1]
+    errors = job.communicate(timeout=600)[1]
     assert job.returncode != 0 and "rank 1" in errors and "Killed" in errors
     when_it_has_ended(out)
     assert len(data_sets(out / "trajectory.h5md")["particles/trajectory/position/step"]) >= 3
@@ -187,7 +187,7 @@ def test_a_stopped_rank(tmp_path):
     out = tmp_path / "out"
     job = start(3, command(write_deck(tmp_path, SPHERES), out, ENDLESS, ("--quiet", "--silence", "2")))
     os.kill(when_it_runs(job, out)[1], signal.SIGSTOP)
-    errors = job.communicate(timeout=60)[1]
+    errors = job.communicate(timeout=600)[1]
     assert job.returncode == 70 and "no answer from rank 1 of 3 for 2 s" in errors
     assert summary(out)["status"] == "failed" and "rank 1 of 3" in summary(out)["error"]
     assert frames_are_sound(out) >= 3
@@ -223,7 +223,7 @@ def test_rank_0_cannot_write(tmp_path):
     rank_0 = when_it_runs(job, out)[0]
     room = (out / "trajectory.h5md").stat().st_size + 1000000
     resource.prlimit(rank_0, resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
-    errors = job.communicate(timeout=60)[1]
+    errors = job.communicate(timeout=600)[1]
     assert job.returncode == 5 and "carom: rank 0 of 3: " in errors and "File too large" in errors
     assert summary(out)["status"] == "failed" and "File too large" in summary(out)["error"]
     assert frames_are_sound(out) >= 3

@@ -23,7 +23,7 @@ def killed(killer, deck, out, at, overrides, go=False, where="", rows=0):
     environment = os.environ | {"LD_PRELOAD": str(killer), "KILL_IN": f"{out}/{where}", "KILL_HALF": str((at or 0) % 2), "KILL_ROWS": str(rows)}
     environment |= {"KILL_AT": str(at)} if at else {"KILL_COUNT": str(out.parent / "count")}
     what = [CAROM, "run", "--continue", str(out), "--quiet"] if go else command(deck, out, overrides)
-    done = subprocess.run(what, env=environment, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(what, env=environment, capture_output=True, text=True, timeout=600)
     assert done.returncode in (0, -signal.SIGKILL), done.stderr
     return done.returncode != 0
 

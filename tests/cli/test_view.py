@@ -35,7 +35,7 @@ def page(*arguments, **options):
         yield process, int(port), path
     finally:
         process.terminate()
-        process.wait(60)
+        process.wait(600)
 
 
 def get(port, path, method="GET"):
@@ -44,7 +44,7 @@ def get(port, path, method="GET"):
 
 
 def asked(port, path, method="GET", **headers):
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=600)
     connection.request(method, path, headers=headers)  # unchanged: urllib would normalise the path
     return connection.getresponse()
 
@@ -149,7 +149,7 @@ def test_no_answer_is_kept_in_a_cache_or_leads_elsewhere(shown):
 def test_connections_without_the_token_do_not_displace_the_page(finished):
     with page("view", finished) as (process, port, path), contextlib.ExitStack() as clients:
         before = len(open_sockets(process))
-        mine = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+        mine = http.client.HTTPConnection("127.0.0.1", port, timeout=600)
         mine.request("GET", path + "runs")
         assert mine.getresponse().read()
         kept = mine.sock
@@ -174,7 +174,7 @@ def unread(port, path):
     """A client that has asked for the large answer and reads its headers only."""
     client = socket.socket()
     client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 14)
-    client.settimeout(60)
+    client.settimeout(600)
     client.connect(("127.0.0.1", port))
     client.sendall(f"GET {path}0/rdf HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
     answer = http.client.HTTPResponse(client)
@@ -186,7 +186,7 @@ def unread(port, path):
 def test_answers_that_nobody_reads_do_not_add_up(large):
     with page("view", large) as (process, port, path):
         before, answers = len(open_sockets(process)), []
-        reading = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+        reading = http.client.HTTPConnection("127.0.0.1", port, timeout=600)
         for _ in range(60):
             reading.request("GET", path + "runs")
             assert reading.getresponse().read()
@@ -342,7 +342,7 @@ def test_a_stopped_viewer_does_not_keep_the_run_from_ending(tmp_path):
         os.kill(int(viewer), signal.SIGSTOP)
         try:
             process.send_signal(signal.SIGUSR2)
-            assert process.wait(60) == 75
+            assert process.wait(600) == 75
             assert not open_at(port)
         finally:
             with contextlib.suppress(ProcessLookupError):
@@ -356,13 +356,13 @@ def test_one_rank_of_several_serves_the_page(tmp_path):
     port, path = re.search(r"127\.0\.0\.1:(\d+)(/\w+/)", process.stdout.readline()).groups()
     wait_until(lambda: json.loads(get(int(port), path + "runs")[1])[0]["frames"] >= 2)
     process.send_signal(signal.SIGUSR2)
-    out, errors = process.communicate(timeout=60)
+    out, errors = process.communicate(timeout=600)
     assert process.returncode == 75 and "http" not in out, errors
     assert not open_at(int(port))
 
 
 def refused(code, *arguments):
-    done = subprocess.run([CAROM, *map(str, arguments)], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([CAROM, *map(str, arguments)], capture_output=True, text=True, timeout=600)
     assert done.returncode == code, done.stderr
     return done.stderr
 
@@ -436,7 +436,7 @@ def test_the_demo_shows_psa_beside_edda(tmp_path):
         error = [float(get(port, path + f"{k}/thermo/0")[1].split(b"\n")[-2].split(b",")[7]) for k in (0, 1)]
         assert error[0] > 1e6 * error[1]
         process.send_signal(signal.SIGINT)
-        assert process.wait(60) == 0
+        assert process.wait(600) == 0
     children = subprocess.run(["pgrep", "-f", str(tmp_path / "demo.toml")], capture_output=True, text=True).stdout
     assert not children
     assert json.loads((tmp_path / "edda" / "summary.json").read_text())["status"] == "interrupted"

@@ -138,7 +138,7 @@ def test_pictures_and_films_are_saved(browser, tmp_path):
             time.sleep(0.1)
         assert not browser.execute_script("return filming") and browser.execute_script("return panels[0].shown") == 6
         browser.get("about:blank")
-        browser.set_script_timeout(60)
+        browser.set_script_timeout(600)
         size = browser.execute_async_script("""const done = arguments[1], video = document.createElement("video");
             video.oncanplay = () => done([video.videoWidth, video.videoHeight]);
             video.onerror = () => done(video.error.message);

@@ -6,7 +6,7 @@
 . "$1"
 code=$2 words=$3 ranks=$4
 shift 4
-if [ "$ranks" != 0 ]; then set -- timeout -k 10 60 mpirun --timeout 40 -n "$ranks" "$@"; fi
+if [ "$ranks" != 0 ]; then set -- timeout -k 10 600 mpirun --timeout 400 -n "$ranks" "$@"; fi
 output=$("$@" 2>&1)
 got=$?
 printf '%s\n' "$output"

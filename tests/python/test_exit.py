@@ -26,7 +26,7 @@ def work():
     print("went on")
 for _ in range({threads}):
     threading.Thread(target=work, daemon=True).start()
-assert begun.wait(60)
+assert begun.wait(600)
 {after}
 """
 
@@ -35,7 +35,7 @@ def ends(work, before="", after="", load="carom.version", threads=2):
     """Standard output of a Python process that ends while daemon threads run this code."""
     script = SCRIPT.format(here=str(pathlib.Path(__file__).parent), work=work, before=before, after=after, load=load,
                            threads=threads)
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=1200)
     assert done.returncode == 0 and done.stderr == "" and "went on" not in done.stdout, (done.returncode, done.stderr, done.stdout)
     return done.stdout
 
@@ -89,7 +89,7 @@ atexit.register(late)"""
                                   "sim = five_springs(); [(sim.run(steps=n), running.set()) for n in itertools.count(1)]"])
 def test_threads_of_a_module_that_is_loaded_too_late_sleep(runs):
     ends(f"begun.set(), go.wait(); {runs}", load="", threads=4,
-         before="go, running = threading.Event(), threading.Event(); atexit.register(lambda: (go.set(), running.wait(60)))")
+         before="go, running = threading.Event(), threading.Event(); atexit.register(lambda: (go.set(), running.wait(600)))")
 
 
 def test_a_fork_has_no_threads_to_wait_for():
@@ -108,8 +108,8 @@ assert os.wait()[1] == 0
 def test_several_processes_do_not_run_one_study_each(before, code):
     """By the real mpirun. A script that says by mpi4py that it divides the work is left alone; mpi4py itself need not be installed here."""
     script = f"{before}\nimport sys\nsys.path.insert(0, {str(pathlib.Path(__file__).parent)!r})\nfrom scenes import five_springs\nfive_springs().run(steps=1)"
-    launch = ["sh", "-c", '. "$0"; exec mpirun --timeout 100 -n 2 "$@"', ROOT / "tools/mpi-env.sh"]
-    done = subprocess.run([*launch, sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
+    launch = ["sh", "-c", '. "$0"; exec mpirun --timeout 1000 -n 2 "$@"', ROOT / "tools/mpi-env.sh"]
+    done = subprocess.run([*launch, sys.executable, "-c", script], capture_output=True, text=True, timeout=1200)
     assert done.returncode == code, done.stderr
     assert ("carom.errors.UsageError: Simulation: this is one of 2 processes" in done.stderr) == (code == 1)
     assert ("mpirun -n … carom run" in done.stderr) == (code == 1)

@@ -29,7 +29,7 @@ def test_a_notebook_has_a_bar_of_progress(tmp_path, monkeypatch):
     cells[0] = cells[0].replace("'tests'", repr(str(__import__("pathlib").Path(__file__).parent)))
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(cell) for cell in cells])
     changes = []
-    client = nbclient.NotebookClient(notebook, timeout=120, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}})
+    client = nbclient.NotebookClient(notebook, timeout=1200, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}})
     real = client.process_message
     monkeypatch.setattr(client, "process_message", lambda message, *more: (changes.append(message), real(message, *more))[1])
     client.execute()

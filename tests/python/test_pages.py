@@ -14,7 +14,7 @@ PAGES = TUTORIALS + GUIDE + [ROOT / "tools" / "site" / "gallery.md"]
 
 
 def run_page(page):
-    return subprocess.run(["/usr/bin/python3", ROOT / "tools" / "run_page.py", page], capture_output=True, text=True, timeout=300)
+    return subprocess.run(["/usr/bin/python3", ROOT / "tools" / "run_page.py", page], capture_output=True, text=True, timeout=3000)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}/{page.stem}")

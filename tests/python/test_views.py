@@ -96,11 +96,11 @@ def test_other_threads_may_look_while_a_run_goes_on():
     def look(s):
         begun.set()
         if s.step == 1500:
-            go_on.wait(60)
+            go_on.wait(600)
 
     worker = threading.Thread(target=lambda: sim.run(steps=2000, every=0.1, callback=look))
     worker.start()
-    assert begun.wait(60)
+    assert begun.wait(600)
     for change in (lambda: sim.add_particles([[0, 0, 0]]), lambda: sim.run(steps=9), lambda: setattr(sim, "velocity", start)):
         with pytest.raises(carom.UsageError, match="a run is going on"):
             change()
@@ -115,7 +115,7 @@ def test_what_was_not_viewed_before_is_there_in_callbacks_only():
     sim.integrator("psa", step=0.001)
 
     def look():
-        assert begun.wait(60)
+        assert begun.wait(600)
         try:
             start = time.process_time()
             while time.process_time() < start + 0.3:  # the callback has returned, and something has collided
