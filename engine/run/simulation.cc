@@ -16,9 +16,6 @@ namespace carom {
 namespace {
 /// Output intervals shorter than this fraction of a step are refused: counting them would take too long.
 constexpr double kLeastInterval = 1e-6;
-/// The longest epoch of a gas that has cooled, in steps: a gas slower than this is at rest to the rounding of
-/// positions.
-constexpr double kLongestEpoch = 1e9;
 /// More kicks of a particle in a step change nothing: that its velocity then stems from a kick has the probability
 /// 1 − e⁻¹⁰⁰.
 constexpr double kMostKicks = 100;
@@ -51,12 +48,6 @@ void check_spheres(const System<D>& system) {
     throw Error(Failure::initial_state, "particles " + std::to_string(overlaps.lo) + " and " +
                                             std::to_string(overlaps.hi) + " overlap, at distance " +
                                             short_text(overlaps.distance) + "; move them apart");
-}
-
-/// The length of the slab that starts then: to the end of the run, if this is less than a step by more than rounding.
-double length_from(double start, const Plan& plan) {
-  const double left = plan.end_time.value_or(std::numeric_limits<double>::infinity()) - start;
-  return left < plan.step - plan.end_slack() ? left : plan.step;
 }
 
 void check_interval(double interval, double step) {
@@ -174,7 +165,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
   const auto make_monitor = [&] {
     monitor_ = std::make_unique<Monitor<D>>(*system_, info_, plan_, observers_, s);
     system_->fields.add_value("quiet since", quiet_since_);
-    system_->fields.add_value("step count", count_);
+    system_->fields.add_value("step count", clock_.count);
   };
   const bool again = monitor_ != nullptr;
   if (!again) {
@@ -203,17 +194,11 @@ void Simulation<D>::begin(const Hooks& hooks) {
     s.stopped_early = false;
   }
   if (again) {
-    // The last slab was shortened to meet the previous end of the run.
-    if (std::abs(s.end_time - next_slab().start) > plan_.end_slack()) {
-      count_.steps = s.steps;
-      count_.time = s.end_time;
-      count_.within = count_.boxes = 0;
-      count_.contacts = 0;
-    }
+    clock_.go_on(s);
     return;
   }
   if (hooks.branch) {
-    count_ = hooks.branch->from;
+    clock_.count = hooks.branch->from;
     s.start_steps = s.steps = hooks.branch->start.steps;
     s.start_time = s.end_time = quiet_since_ = hooks.branch->start.time;
     make_monitor();
@@ -240,19 +225,19 @@ void Simulation<D>::run(const Hooks& hooks) {
     const Stopwatch stopwatch(s.counters.seconds.output);
     if (system_->box.bath.kicks())
       std::erase_if(contacts, [](const auto& each) { return each.key.kind == EventKind::kick; });
-    for (auto& contact : contacts) contact.key.time += count_.within;
-    for (auto* observer : observers_) observer->contacts(time_of(slab.index), contacts);
+    for (auto& contact : contacts) contact.key.time += clock_.count.within;
+    for (auto* observer : observers_) observer->contacts(clock_.time_of(slab.index), contacts);
     contacts.clear();
   };
   for (;;) {
-    const bool done = finished();
+    const bool done = clock_.finished(s);
     take_time();
     if (hooks.should_stop && hooks.should_stop() && !done) {
       s.stopped_early = true;
       break;
     }
     if (done) break;
-    const Slab slab = next_slab();
+    const Slab slab = clock_.next_slab(s);
     s.counters.divisions += system_->decomposition.divide_if_due(slab.index, slab.length);
     const std::vector<double> due = info_.stepping ? std::vector<double>{} : monitor_->due_within(slab);
     contacts.clear();
@@ -273,33 +258,15 @@ void Simulation<D>::run(const Hooks& hooks) {
     act_of_bath(slab, report);
     show_contacts(slab);
     s.counters.seconds.communicate = system_->decomposition.seconds_waited();
-    last_collisions_ = s.counters.sphere_sphere - collisions;
-    cut_ = slab.steps < count_.stride;
-    count_.contacts += 2 * *last_collisions_ + s.counters.sphere_wall - at_walls;
-    count_.boxes = std::max(count_.boxes, report.boxes);
-    if (*last_collisions_ > 0) quiet_since_ = slab.start + report.reached;
-
-    const double step = length_from(time_of(slab.index), plan_);
-    if (report.reached < slab.length) {
-      const double within = count_.within + report.reached;
-      s.end_time = time_of(slab.index) + within;
-      if (finished())
-        ++s.steps;
-      else
-        count_.within = within;
-    } else {
-      // Whole slabs end at whole multiples of the step, a shortened one at the end of the plan: rounding does not
-      // accumulate.
-      s.steps += slab.steps;
-      s.end_time = step == plan_.step ? time_of(s.steps) : *plan_.end_time;
-      if (!system_->box.bath.rescales()) lengthen_slabs(count_.within + slab.length);
-      count_.within = 0;
-    }
+    const std::uint64_t pairs = s.counters.sphere_sphere - collisions, walls = s.counters.sphere_wall - at_walls;
+    if (pairs > 0) quiet_since_ = slab.start + report.reached;
+    const double complete = clock_.end_slab(slab, report.reached, pairs, walls, report.boxes, s);
+    if (complete > 0 && !system_->box.bath.rescales()) lengthen_slabs(complete);
     if (!info_.stepping && plan_.collisions && !plan_.end_time && !plan_.steps) need_collisions();
     s.force_passes = s.counters.force_passes;
-    s.fraction_done = fraction_done();
+    s.fraction_done = clock_.fraction_done(s);
     take_time();
-    monitor_->end_of_slab(report.reached, *integrator_, finished());
+    monitor_->end_of_slab(report.reached, *integrator_, clock_.finished(s));
     for (auto* observer : observers_) observer->progress(s);
   }
   // Rows and frames have the time of the step, as in a longer run.
@@ -361,7 +328,7 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
 template <int D>
 void Simulation<D>::act_of_bath(const Slab& slab, SlabReport<D>& report) {
   const Bath& bath = system_->box.bath;
-  const double start = time_of(slab.index), length = length_from(start, plan_);
+  const double start = clock_.time_of(slab.index), length = clock_.length_from(start);
   if (bath.rescales() && !(report.reached < slab.length))
     rescale(*system_, slab.index, start + length, length, report.counters);
   if (bath.kicks() && info_.stepping) kick_all(*system_, slab.start, slab.length, report.counters);
@@ -390,88 +357,25 @@ void Simulation<D>::need_collisions() const {
                                       "there will be no more collisions; give run.end_time, or close the box");
 }
 
-template <int D>
-bool Simulation<D>::is_last_on_the_way() const {
-  const Statistics& s = statistics_;
-  const Slab next = next_slab();
-  // A slab that meets an end may differ from a step by rounding alone.
-  const bool whole =
-      !cut_ && s.end_time == next.start &&
-      (s.steps == s.start_steps || count_.within > 0 || length_from(time_of(s.steps - 1), plan_) == plan_.step);
-  if (!whole) return false;
-  if (finished() || next.steps < count_.stride || length_from(time_of(s.steps), plan_) != plan_.step) return true;
-  // Free flight ends within a slab at its last collision; the slab before predicts the number of collisions.
-  return plan_.collisions && next.collision_limit == *plan_.collisions &&
-         (!last_collisions_ || s.counters.sphere_sphere + 2 * *last_collisions_ + 1000 >= *plan_.collisions);
-}
-
 /// Sets the length of the next slab after one of this length: its number of collisions hardly changes as the gas cools,
 /// and an epoch with too few collisions is followed by one that is longer by a power of four, so that ordinary gases
 /// keep their steps. Collective.
 template <int D>
 void Simulation<D>::lengthen_slabs(double length) {
-  const double most = info_.stepping ? std::floor(plan_.longest_step / plan_.step) : kLongestEpoch;
+  const double most = clock_.most_steps();
   if (!(most > 1)) return;
   double steps = 1;
   if (!system_->box.contacts.elastic()) {
     const double speed = thermal_speed(*system_);
-    if (count_.first_speed == 0) count_.first_speed = speed;
-    if (speed > 0) steps = std::clamp(count_.first_speed / speed, 1.0, most);
+    if (clock_.count.first_speed == 0) clock_.count.first_speed = speed;
+    if (speed > 0) steps = std::clamp(clock_.count.first_speed / speed, 1.0, most);
   }
   if (integrator_->lengthens()) {
-    const double events = static_cast<double>(count_.contacts) / static_cast<double>(system_->size());
-    const double wanted = next_epoch(*system_, {length, events, count_.boxes});
+    const double events = static_cast<double>(clock_.count.contacts) / static_cast<double>(system_->size());
+    const double wanted = next_epoch(*system_, {length, events, clock_.count.boxes});
     while (4 * steps * plan_.step <= wanted) steps *= 4;
   }
-  const auto before = count_.stride;
-  count_.stride = static_cast<std::int64_t>(std::min(steps, most));
-  if (count_.stride > before) *last_collisions_ *= static_cast<std::uint64_t>(count_.stride / before + 1);
-  count_.contacts = 0;
-  count_.boxes = 0;
-}
-
-template <int D>
-Slab Simulation<D>::next_slab() const {
-  Slab slab;
-  slab.index = statistics_.steps;
-  slab.start = time_of(slab.index) + count_.within;
-  slab.steps = count_.stride;
-  if (plan_.steps) slab.steps = std::min(slab.steps, *plan_.steps - slab.index);
-  if (plan_.end_time) {
-    const double left = *plan_.end_time - plan_.end_slack() - time_of(slab.index);
-    slab.steps = static_cast<std::int64_t>(std::min(static_cast<double>(slab.steps), left / plan_.step));
-  }
-  slab.steps = std::max<std::int64_t>(slab.steps, 1);
-  const double length =
-      slab.steps == 1 ? length_from(time_of(slab.index), plan_) : static_cast<double>(slab.steps) * plan_.step;
-  slab.length = length - count_.within;
-  if (!info_.stepping) {
-    slab.contact_limit = 2 * most_collisions_;
-    slab.collision_limit = std::min(statistics_.counters.sphere_sphere + most_collisions_,
-                                    plan_.collisions.value_or(slab.collision_limit));
-  }
-  return slab;
-}
-
-template <int D>
-bool Simulation<D>::finished() const {
-  const Statistics& s = statistics_;
-  return (plan_.steps && s.steps >= *plan_.steps) ||
-         (plan_.end_time && s.end_time >= *plan_.end_time - plan_.end_slack()) ||
-         (plan_.collisions && s.counters.sphere_sphere >= *plan_.collisions);
-}
-
-template <int D>
-double Simulation<D>::fraction_done() const {
-  const Statistics& s = statistics_;
-  double done = 0;
-  if (plan_.steps)
-    done = std::max(done,
-                    static_cast<double>(s.steps - s.start_steps) / static_cast<double>(*plan_.steps - s.start_steps));
-  if (plan_.end_time) done = std::max(done, (s.end_time - s.start_time) / (*plan_.end_time - s.start_time));
-  if (plan_.collisions)
-    done = std::max(done, static_cast<double>(s.counters.sphere_sphere) / static_cast<double>(*plan_.collisions));
-  return done;
+  clock_.lengthen(steps);
 }
 
 template class Simulation<2>;

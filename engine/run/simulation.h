@@ -20,6 +20,7 @@
 #include "engine/integrators/integrator.h"
 #include "engine/ranks/system.h"
 #include "engine/run/blocking.h"
+#include "engine/run/run_clock.h"
 
 namespace carom {
 
@@ -178,20 +179,6 @@ struct Statistics {
   }
 };
 
-/// The origin of the step count: step n ends at time + (n − steps) · Plan::step.
-struct StepCount {
-  std::int64_t steps = 0;
-  double time = 0;
-  /// How far an epoch of free flight has advanced that needs several slabs [time].
-  double within = 0;
-  /// What happened in the epoch so far.
-  double boxes = 0;            ///< PastEpoch::boxes
-  std::uint64_t contacts = 0;  ///< of pairs twice
-  /// Free flight with contacts that dissipate: an epoch is as many steps long as the gas is slower than at the start.
-  double first_speed = 0;   ///< thermal speed at the start [length/time]
-  std::int64_t stride = 1;  ///< steps of the next epoch
-};
-
 template <int D>
 class Monitor;
 
@@ -245,13 +232,13 @@ class Simulation {
   /// end of the epoch; or after twice as many contacts, with walls and with the bath. The default is 500 000, which
   /// take less than a second, or 4N if this is more: starting a slab costs a fifth of a collision per particle, a
   /// twentieth of 4N collisions.
-  void limit_slabs(std::uint64_t collisions) { most_collisions_ = collisions; }
+  void limit_slabs(std::uint64_t collisions) { clock_.limit_slabs(collisions); }
   /// Sets another end for the next run(); step and intervals stay as in the first plan.
   void extend(const Plan& end);
 
   /// Call in should_stop(): whether a run with a later end would continue from here with the same steps. This may be
   /// false after the next slab, which may meet the end.
-  bool is_last_on_the_way() const;
+  bool is_last_on_the_way() const { return clock_.is_last_on_the_way(statistics_); }
 
   const Statistics& statistics() const { return statistics_; }
   const System<D>& system() const { return *system_; }
@@ -271,14 +258,8 @@ class Simulation {
   bool fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watch);
   void act_of_bath(const Slab& slab, SlabReport<D>& report);
   void set_ramp();
-  double time_of(std::int64_t step) const {
-    return count_.time + static_cast<double>(step - count_.steps) * plan_.step;
-  }
-  Slab next_slab() const;
   void lengthen_slabs(double length);
-  bool finished() const;
   void need_collisions() const;
-  double fraction_done() const;
 
   Plan plan_;  // checked before the system is moved
   std::unique_ptr<System<D>> system_;
@@ -287,13 +268,10 @@ class Simulation {
   std::vector<Observer<D>*> observers_;
   bool contacts_needed_ = plan_.events;
   Statistics statistics_;
-  StepCount count_;
-  double quiet_since_ = 0;  // end of the last slab with pair collisions
-  std::uint64_t most_collisions_ = std::max<std::uint64_t>(500'000, 4 * system_->size());  // per slab of an epoch
-  std::optional<std::uint64_t> last_collisions_;  // in the last slab, if this run() executed it
-  bool cut_ = false;                              // whether the end of the plan shortened the last slab by whole steps
-  std::unique_ptr<Monitor<D>> monitor_;           // from the first run() on
-  std::size_t first_of_integrator_ = 0;           // its first entry in Fields::of_run()
+  RunClock clock_{plan_, info_.stepping, system_->size()};
+  double quiet_since_ = 0;               // end of the last slab with pair collisions
+  std::unique_ptr<Monitor<D>> monitor_;  // from the first run() on
+  std::size_t first_of_integrator_ = 0;  // its first entry in Fields::of_run()
 };
 
 }  // namespace carom

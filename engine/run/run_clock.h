@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+// The clock of a run: which slab comes next, what time it is after it, and whether the run has ended. It knows the plan
+// and what has been counted, and nothing of the particles.
+//
+// Step n ends at a whole multiple of the step after the origin of the count, so that rounding does not accumulate. The
+// last step may be shortened to end at Plan::end_time. An epoch of free flight may need several slabs, and may be as
+// long as several steps.
+
+#include <cstdint>
+#include <optional>
+
+#include "engine/integrators/integrator.h"
+
+namespace carom {
+
+struct Plan;
+struct Statistics;
+
+/// The origin of the step count: step n ends at time + (n − steps) · Plan::step.
+struct StepCount {
+  std::int64_t steps = 0;
+  double time = 0;
+  /// How far an epoch of free flight has advanced that needs several slabs [time].
+  double within = 0;
+  /// What happened in the epoch so far.
+  double boxes = 0;            ///< PastEpoch::boxes
+  std::uint64_t contacts = 0;  ///< of pairs twice
+  /// Free flight with contacts that dissipate: an epoch is as many steps long as the gas is slower than at the start.
+  double first_speed = 0;   ///< thermal speed at the start [length/time]
+  std::int64_t stride = 1;  ///< steps of the next epoch
+};
+
+class RunClock {
+ public:
+  /// `plan` must outlive the clock; its end may change. `stepping`: IntegratorInfo::stepping.
+  RunClock(const Plan& plan, bool stepping, std::size_t particles);
+
+  /// See Simulation::limit_slabs().
+  void limit_slabs(std::uint64_t collisions) { most_collisions_ = collisions; }
+
+  double time_of(std::int64_t step) const;
+  /// The length of the step that starts then: to the end of the run, if this is less than a step by more than rounding.
+  double length_from(double start) const;
+  Slab next_slab(const Statistics& s) const;
+  bool finished(const Statistics& s) const;
+  double fraction_done(const Statistics& s) const;
+  /// See Simulation::is_last_on_the_way().
+  bool is_last_on_the_way(const Statistics& s) const;
+
+  /// Counts a slab that has reached this time within it: sets the steps and the time in `s`. `pairs` and `walls` are
+  /// its contacts, `boxes` its PastEpoch::boxes. Returns the length of the step or epoch if that is now complete, else
+  /// 0.
+  double end_slab(const Slab& slab, double reached, std::uint64_t pairs, std::uint64_t walls, double boxes,
+                  Statistics& s);
+  /// The largest number of steps that an epoch may have.
+  double most_steps() const;
+  /// Sets the number of steps of the next epoch. Call when one is complete.
+  void lengthen(double steps);
+  /// Call before a run goes on to another end: counts from here if the last slab was shortened to meet the previous
+  /// one.
+  void go_on(const Statistics& s);
+
+  StepCount count;  ///< state of the run
+
+ private:
+  const Plan& plan_;
+  bool stepping_;
+  std::uint64_t most_collisions_;                 // per slab of an epoch
+  std::optional<std::uint64_t> last_collisions_;  // in the last slab, if this run has executed one
+  bool cut_ = false;                              // whether the end of the plan shortened the last slab by whole steps
+};
+
+}  // namespace carom

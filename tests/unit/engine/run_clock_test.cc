@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine/run/run_clock.h"
+
+#include <gtest/gtest.h>
+
+#include "engine/run/simulation.h"
+
+namespace carom {
+namespace {
+
+/// A clock with a plan that runs without particles.
+struct Journey {
+  Plan plan;
+  bool stepping = true;
+  RunClock clock{plan, stepping, 10};
+  Statistics s{};
+
+  /// Runs a slab to its end, or up to `reached` within it.
+  Slab slab(double reached = -1, std::uint64_t pairs = 0) {
+    const Slab slab = clock.next_slab(s);
+    s.counters.sphere_sphere += pairs;
+    complete = clock.end_slab(slab, reached < 0 ? slab.length : reached, pairs, 0, 0, s);
+    return slab;
+  }
+  double complete = 0;
+};
+
+TEST(RunClock, TheLastStepIsShortenedToEndOnTime) {
+  Journey run{{.step = 0.1, .end_time = 0.35}};
+  for (int n = 0; n < 3; ++n) {
+    EXPECT_FALSE(run.clock.finished(run.s));
+    EXPECT_EQ(run.slab().length, 0.1);
+    EXPECT_EQ(run.s.end_time, (n + 1) * 0.1);
+  }
+  EXPECT_NEAR(run.slab().length, 0.05, 1e-15);
+  EXPECT_EQ(run.s.end_time, 0.35);
+  EXPECT_EQ(run.s.steps, 4);
+  EXPECT_TRUE(run.clock.finished(run.s));
+}
+
+TEST(RunClock, AStepThatIsWholeButForRoundingIsWhole) {
+  Journey run{{.step = 0.1, .end_time = 0.3}};  // 3 × 0.1 is above 0.3
+  while (!run.clock.finished(run.s)) EXPECT_EQ(run.slab().length, 0.1);
+  EXPECT_EQ(run.s.steps, 3);
+}
+
+TEST(RunClock, AnEpochThatStopsGoesOnWhereItStopped) {
+  Journey run{.plan = {.step = 1, .collisions = 60}, .stepping = false};
+  run.clock.limit_slabs(50);
+  EXPECT_EQ(run.clock.next_slab(run.s).collision_limit, 50);
+  EXPECT_EQ(run.clock.next_slab(run.s).contact_limit, 100);
+  run.slab(0.25, 50);
+  EXPECT_EQ(run.complete, 0);
+  EXPECT_EQ(run.s.end_time, 0.25);
+  const Slab rest = run.clock.next_slab(run.s);
+  EXPECT_EQ(rest.index, 0);
+  EXPECT_EQ(rest.start, 0.25);
+  EXPECT_EQ(rest.length, 0.75);
+  EXPECT_EQ(rest.collision_limit, 60);  // the end of the run
+  run.slab(0.5, 10);
+  EXPECT_TRUE(run.clock.finished(run.s));
+  EXPECT_EQ(run.s.end_time, 0.75);
+  EXPECT_EQ(run.s.steps, 1);
+}
+
+TEST(RunClock, EpochsHaveSeveralStepsAndKeepToTheEnd) {
+  Journey run{.plan = {.step = 0.5, .steps = 10}, .stepping = false};
+  run.slab();
+  EXPECT_EQ(run.complete, 0.5);
+  run.clock.lengthen(4);
+  EXPECT_EQ(run.slab().length, 2);
+  EXPECT_EQ(run.s.steps, 5);
+  run.slab();
+  EXPECT_EQ(run.slab().steps, 1);  // 10 − 9
+  EXPECT_TRUE(run.clock.finished(run.s));
+  EXPECT_EQ(run.s.end_time, 5);
+}
+
+TEST(RunClock, ARunThatGoesOnCountsFromTheShortenedStep) {
+  Journey run{{.step = 0.1, .end_time = 0.25}};
+  while (!run.clock.finished(run.s)) run.slab();
+  run.plan.end_time = 0.5;
+  run.clock.go_on(run.s);
+  const Slab next = run.clock.next_slab(run.s);
+  EXPECT_EQ(next.start, 0.25);
+  EXPECT_EQ(next.length, 0.1);
+  EXPECT_EQ(run.clock.time_of(4), 0.25 + 0.1);
+}
+
+TEST(RunClock, OnTheWayOfALongerRunAreWholeStepsOnly) {
+  Journey run{{.step = 0.1, .end_time = 0.25}};
+  EXPECT_FALSE(run.clock.is_last_on_the_way(run.s));  // the next step is whole, too
+  run.slab();
+  EXPECT_FALSE(run.clock.is_last_on_the_way(run.s));
+  run.slab();
+  EXPECT_TRUE(run.clock.is_last_on_the_way(run.s));  // the next one is shortened
+  run.slab();
+  EXPECT_FALSE(run.clock.is_last_on_the_way(run.s));
+}
+
+TEST(RunClock, TheNearestEndSaysHowMuchIsDone) {
+  Journey run{{.step = 1, .steps = 10, .end_time = 40}};
+  run.slab();
+  run.slab();
+  EXPECT_EQ(run.clock.fraction_done(run.s), 0.2);
+}
+
+}  // namespace
+}  // namespace carom
