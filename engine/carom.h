@@ -14,15 +14,15 @@
 // Mistakes throw carom::Error; its message says what to do.
 
 #include "engine/base/error.h"
-#include "engine/base/interaction.h"
 #include "engine/forces/add_interaction.h"
 #include "engine/forces/forces.h"
 #include "engine/forces/potentials/options.h"
 #include "engine/integrators/integrator.h"
+#include "engine/laws/interaction.h"
 #include "engine/ranks/system.h"
 #include "engine/run/mean_squared_displacement.h"
 #include "engine/run/observable.h"
 #include "engine/run/radial_distribution.h"
 #include "engine/run/simulation.h"
 #include "engine/setup/placement.h"
-#include "engine/slabs/slab_core.h"
+#include "engine/stepping/slab_core.h"

@@ -13,7 +13,7 @@
 #include <limits>
 #include <thread>
 
-#include "engine/base/counters.h"
+#include "engine/laws/counters.h"
 
 namespace carom {
 

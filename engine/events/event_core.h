@@ -17,9 +17,9 @@
 //   core.run(end, report);                        // executes events with time < end
 //   core.fly_to(end, particles);                  // copies, advanced to `end`
 
-#include "engine/base/counters.h"
 #include "engine/events/event_search.h"
 #include "engine/events/trace.h"
+#include "engine/laws/counters.h"
 
 namespace carom {
 

@@ -8,12 +8,12 @@
 
 #include <span>
 
-#include "engine/base/box.h"
-#include "engine/base/contact_log.h"
 #include "engine/base/pages.h"
 #include "engine/base/particles.h"
 #include "engine/base/record.h"
 #include "engine/base/sizes.h"
+#include "engine/laws/box.h"
+#include "engine/laws/contact_log.h"
 #include "engine/search/cell_grid.h"
 #include "engine/search/simd/scan.h"
 

@@ -6,13 +6,13 @@
 // The times of two spheres are in contact.h. An elastic contact conserves the kinetic energy to rounding, any contact
 // of two spheres their momentum and their angular momentum.
 
-#include "engine/base/box.h"
-#include "engine/base/contact_log.h"
 #include "engine/base/particles.h"
 #include "engine/events/contact.h"
 #include "engine/events/rough_contact.h"
 #include "engine/events/shaken_contact.h"
 #include "engine/events/thermal_contact.h"
+#include "engine/laws/box.h"
+#include "engine/laws/contact_log.h"
 
 namespace carom {
 

@@ -14,8 +14,8 @@
 
 #include <cstdint>
 
-#include "engine/base/contact_law.h"
 #include "engine/base/vec.h"
+#include "engine/laws/contact_law.h"
 
 namespace carom {
 

@@ -5,9 +5,9 @@
 
 #include <cmath>
 
-#include "engine/base/box.h"
 #include "engine/events/contact.h"
 #include "engine/events/flights.h"
+#include "engine/laws/box.h"
 #include "engine/search/linked_cells.h"
 #include "engine/search/next_event.h"
 

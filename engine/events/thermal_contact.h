@@ -6,7 +6,7 @@
 // along the normal has the distribution of the particles that cross a plane (Tehver, Toigo, Koplik, Banavar, Phys. Rev.
 // E 57 (1998) R17).
 
-#include "engine/base/contact_log.h"
+#include "engine/laws/contact_log.h"
 
 namespace carom {
 

@@ -10,10 +10,10 @@
 #include <span>
 #include <vector>
 
-#include "engine/base/contact_log.h"
 #include "engine/base/pages.h"
 #include "engine/base/prefetch.h"
 #include "engine/base/record.h"
+#include "engine/laws/contact_log.h"
 
 namespace carom {
 

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "engine/base/counters.h"
 #include "engine/base/elementary.h"
+#include "engine/laws/counters.h"
 #include "engine/ranks/system.h"
 
 namespace carom {

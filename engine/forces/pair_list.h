@@ -9,10 +9,10 @@
 #include <span>
 #include <vector>
 
-#include "engine/base/box.h"
 #include "engine/base/particles.h"
 #include "engine/forces/pair_filter.h"
 #include "engine/forces/pair_records.h"
+#include "engine/laws/box.h"
 #include "engine/search/skin.h"
 
 namespace carom {

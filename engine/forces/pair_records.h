@@ -9,9 +9,9 @@
 #include <span>
 #include <vector>
 
-#include "engine/base/box.h"
 #include "engine/base/force_sums.h"
 #include "engine/forces/simd/pair_kernels.h"
+#include "engine/laws/box.h"
 
 namespace carom {
 

@@ -15,7 +15,7 @@
 #include "engine/integrators/chord_contacts.h"
 #include "engine/integrators/discrete_gradient.h"
 #include "engine/integrators/registry.h"
-#include "engine/slabs/contact_scan.h"
+#include "engine/stepping/contact_scan.h"
 
 namespace carom::integrator {
 namespace {

@@ -11,7 +11,7 @@
 #include <cmath>
 
 #include "engine/integrators/discrete_gradient.h"
-#include "engine/slabs/contact_scan.h"
+#include "engine/stepping/contact_scan.h"
 
 namespace carom::integrator {
 

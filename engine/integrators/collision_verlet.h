@@ -9,7 +9,7 @@
 
 #include "engine/integrators/integrator.h"
 #include "engine/integrators/kicks.h"
-#include "engine/slabs/contact_scan.h"
+#include "engine/stepping/contact_scan.h"
 
 namespace carom::integrator {
 

@@ -10,7 +10,7 @@
 // (1990) 319).
 
 #include "engine/forces/forces.h"
-#include "engine/slabs/contact_scan.h"
+#include "engine/stepping/contact_scan.h"
 
 namespace carom::integrator {
 

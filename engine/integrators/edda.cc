@@ -15,7 +15,7 @@
 // is folded into the velocities by a common factor. If the kinetic energy is too small for that, the sweeps continue to
 // rounding, or the slab is shortened; the energy that rounding then leaves is carried over to the next slab.
 //
-// Contacts at rest are held by reactions (engine/slabs/resting.h), which are part of m a′; their work, zero once the
+// Contacts at rest are held by reactions (engine/stepping/resting.h), which are part of m a′; their work, zero once the
 // sweeps have converged, is part of r.
 
 #include <algorithm>
@@ -33,7 +33,7 @@
 #include "engine/integrators/chebyshev.h"
 #include "engine/integrators/extrapolation.h"
 #include "engine/integrators/registry.h"
-#include "engine/slabs/slab_core.h"
+#include "engine/stepping/slab_core.h"
 
 namespace carom::integrator {
 namespace {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "engine/base/fields.h"
-#include "engine/base/interaction.h"
+#include "engine/laws/interaction.h"
 
 namespace carom::integrator {
 

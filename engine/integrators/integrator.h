@@ -9,11 +9,11 @@
 #include <string_view>
 #include <vector>
 
-#include "engine/base/contact_log.h"
-#include "engine/base/counters.h"
 #include "engine/base/parameters.h"
+#include "engine/laws/contact_log.h"
+#include "engine/laws/counters.h"
 #include "engine/ranks/system.h"
-#include "engine/slabs/slab_watch.h"
+#include "engine/stepping/slab_watch.h"
 
 namespace carom {
 

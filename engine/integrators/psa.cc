@@ -6,7 +6,7 @@
 #include "engine/events/meeting.h"
 #include "engine/integrators/kicks.h"
 #include "engine/integrators/registry.h"
-#include "engine/slabs/slab_core.h"
+#include "engine/stepping/slab_core.h"
 
 namespace carom::integrator {
 namespace {

@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include "engine/base/box.h"
+#include "engine/laws/box.h"
 #include "engine/ranks/communicator.h"
 
 namespace carom {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "engine/base/bytes.h"
-#include "engine/base/counters.h"
+#include "engine/laws/counters.h"
 
 namespace carom {
 

@@ -12,8 +12,8 @@
 //   work is done by each rank for all particles that it has.
 //
 // A rank advances its ghosts like its own particles. Ghosts at the rim of the halo lack partners and may become wrong,
-// so the ranks check that the ghosts that matter had the same events as on their owners (engine/slabs/slab_core.h). If
-// not, the slab is repeated with a larger halo (halo_width.h), finally with all particles on each rank. Before any
+// so the ranks check that the ghosts that matter had the same events as on their owners (engine/stepping/slab_core.h).
+// If not, the slab is repeated with a larger halo (halo_width.h), finally with all particles on each rank. Before any
 // particle has moved too far, particles migrate: each owner sends it, with its fields, to the ranks that need it
 // (migration.h).
 
@@ -23,9 +23,9 @@
 #include <vector>
 
 #include "engine/base/fields.h"
-#include "engine/base/interaction.h"
 #include "engine/base/particles.h"
 #include "engine/base/sizes.h"
+#include "engine/laws/interaction.h"
 #include "engine/ranks/communicator.h"
 #include "engine/ranks/halo_exchange.h"
 #include "engine/ranks/halo_width.h"

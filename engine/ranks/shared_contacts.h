@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "engine/base/contact_log.h"
-#include "engine/base/counters.h"
+#include "engine/laws/contact_log.h"
+#include "engine/laws/counters.h"
 #include "engine/ranks/system.h"
 
 namespace carom {

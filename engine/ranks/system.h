@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "engine/base/box.h"
 #include "engine/base/fields.h"
-#include "engine/base/interaction.h"
 #include "engine/base/particles.h"
+#include "engine/laws/box.h"
+#include "engine/laws/interaction.h"
 #include "engine/ranks/decomposition.h"
 
 namespace carom {

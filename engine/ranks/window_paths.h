@@ -6,8 +6,8 @@
 // the one in the log.
 
 #include "engine/base/bytes.h"
-#include "engine/base/contact_tally.h"
 #include "engine/events/trace.h"
+#include "engine/laws/contact_tally.h"
 #include "engine/ranks/by_slot.h"
 #include "engine/ranks/ownership.h"
 

@@ -3,7 +3,7 @@
 // What the bath of a system does at the end of a slab: `rescaling` acts there, and `andersen` in methods with steps. In
 // free flight its kicks are events (engine/events/).
 
-#include "engine/base/counters.h"
+#include "engine/laws/counters.h"
 #include "engine/ranks/system.h"
 
 namespace carom {

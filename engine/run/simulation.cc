@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "engine/base/error.h"
-#include "engine/base/wall_options.h"
 #include "engine/forces/forces.h"
+#include "engine/laws/wall_options.h"
 #include "engine/run/baths.h"
 #include "engine/run/monitor.h"
 #include "engine/setup/epoch.h"

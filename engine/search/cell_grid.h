@@ -14,8 +14,8 @@
 #include <span>
 #include <vector>
 
-#include "engine/base/box.h"
 #include "engine/base/elementary.h"
+#include "engine/laws/box.h"
 
 namespace carom {
 

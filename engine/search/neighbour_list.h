@@ -10,8 +10,8 @@
 #include <span>
 #include <vector>
 
-#include "engine/base/box.h"
 #include "engine/base/vec.h"
+#include "engine/laws/box.h"
 #include "engine/search/partners.h"
 #include "engine/search/skin.h"
 

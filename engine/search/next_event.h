@@ -4,8 +4,8 @@
 
 #include <limits>
 
-#include "engine/base/contact_log.h"
 #include "engine/base/record.h"
+#include "engine/laws/contact_log.h"
 #include "engine/search/cell_grid.h"
 
 namespace carom {

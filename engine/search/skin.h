@@ -10,8 +10,8 @@
 #include <cstdint>
 #include <string>
 
-#include "engine/base/box.h"
 #include "engine/base/error.h"
+#include "engine/laws/box.h"
 
 namespace carom {
 

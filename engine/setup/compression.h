@@ -22,7 +22,7 @@
 #include <span>
 #include <vector>
 
-#include "engine/base/box.h"
+#include "engine/laws/box.h"
 #include "engine/setup/placement.h"
 
 namespace carom {

@@ -15,9 +15,9 @@
 #include <tuple>
 #include <vector>
 
-#include "engine/base/box.h"
 #include "engine/base/particles.h"
 #include "engine/base/random.h"
+#include "engine/laws/box.h"
 #include "engine/ranks/communicator.h"
 
 namespace carom {
@@ -64,7 +64,7 @@ std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<c
                              std::span<const Id> ids, std::uint64_t seed, const Pause& pause = {},
                              std::uint64_t tries = 20000);
 
-/// Pairs closer than their contact distance by more than the gap tolerance (engine/base/wall.h), also through periodic
+/// Pairs closer than their contact distance by more than the gap tolerance (engine/laws/wall.h), also through periodic
 /// images; pairs are ignored if `beyond` marks the sphere with the larger index, or `fixed` both.
 struct Overlaps {
   std::size_t pairs = 0;

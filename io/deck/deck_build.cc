@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 
-#include "engine/base/bath_options.h"
-#include "engine/base/contact_options.h"
-#include "engine/base/wall_options.h"
 #include "engine/forces/pair_filter.h"
+#include "engine/laws/bath_options.h"
+#include "engine/laws/contact_options.h"
+#include "engine/laws/wall_options.h"
 #include "engine/ranks/id_blocks.h"
 #include "engine/setup/epoch.h"
 #include "engine/setup/placement.h"

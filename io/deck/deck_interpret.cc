@@ -3,9 +3,9 @@
 #include <array>
 #include <limits>
 
-#include "engine/base/bath_options.h"
-#include "engine/base/contact_options.h"
-#include "engine/base/wall_options.h"
+#include "engine/laws/bath_options.h"
+#include "engine/laws/contact_options.h"
+#include "engine/laws/wall_options.h"
 #include "io/deck/deck_source.h"
 #include "io/deck/options.h"
 

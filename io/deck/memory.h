@@ -2,7 +2,7 @@
 #pragma once
 // How much memory a deck needs, and how much is available: a run that needs too much ends before it allocates.
 
-#include "engine/base/box.h"
+#include "engine/laws/box.h"
 #include "io/deck/deck_source.h"
 
 namespace carom {

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 
-#include "engine/base/bath_options.h"
-#include "engine/base/contact_options.h"
-#include "engine/base/interaction.h"
-#include "engine/base/wall_options.h"
 #include "engine/integrators/integrator.h"
+#include "engine/laws/bath_options.h"
+#include "engine/laws/contact_options.h"
+#include "engine/laws/interaction.h"
+#include "engine/laws/wall_options.h"
 
 namespace carom {
 namespace {

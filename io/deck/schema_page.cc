@@ -5,8 +5,8 @@
 #include <iterator>
 #include <sstream>
 
-#include "engine/base/interaction.h"
 #include "engine/integrators/integrator.h"
+#include "engine/laws/interaction.h"
 #include "io/deck/deck_problems.h"
 #include "io/deck/schema.h"
 

@@ -9,11 +9,11 @@
 #include <optional>
 #include <utility>
 
-#include "engine/base/bath_options.h"
-#include "engine/base/boundary.h"
-#include "engine/base/contact_options.h"
-#include "engine/base/wall_options.h"
 #include "engine/forces/potentials/table.h"
+#include "engine/laws/bath_options.h"
+#include "engine/laws/boundary.h"
+#include "engine/laws/contact_options.h"
+#include "engine/laws/wall_options.h"
 #include "io/deck/schema.h"
 #include "io/files/thermo.h"
 #include "io/files/version.h"

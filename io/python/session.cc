@@ -5,8 +5,8 @@
 #include <chrono>
 #include <cmath>
 
-#include "engine/base/contact_options.h"
-#include "engine/base/wall_options.h"
+#include "engine/laws/contact_options.h"
+#include "engine/laws/wall_options.h"
 #include "engine/run/measurement.h"
 #include "engine/run/state.h"
 #include "engine/setup/epoch.h"

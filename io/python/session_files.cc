@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The files of a session's runs: their deck, their state, the averages.
 
-#include "engine/base/bath_options.h"
+#include "engine/laws/bath_options.h"
 #include "engine/setup/placement.h"
 #include "io/deck/deck_source.h"
 #include "io/python/session.h"

@@ -12,7 +12,7 @@
 #include "engine/forces/forces.h"
 #include "engine/forces/simd/pair_kernels.h"
 #include "engine/run/simulation.h"
-#include "engine/slabs/path_hash.h"
+#include "engine/stepping/path_hash.h"
 
 namespace carom::bench {
 namespace {

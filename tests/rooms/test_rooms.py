@@ -8,11 +8,12 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 # From the ground up. A room of one line stands beside the others in it, and includes none of them.
 FLOORS = """
 engine/base
+engine/laws
 engine/search
 engine/events
 engine/ranks
 engine/forces
-engine/setup engine/slabs
+engine/setup engine/stepping
 engine/integrators
 engine/run
 engine/carom.h engine/examples

@@ -5,9 +5,9 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "engine/base/contact_options.h"
 #include "engine/base/random.h"
 #include "engine/forces/pair_filter.h"
+#include "engine/laws/contact_options.h"
 #include "engine/ranks/id_blocks.h"
 #include "engine/setup/placement.h"
 

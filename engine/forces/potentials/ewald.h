@@ -36,8 +36,8 @@
 #include <cmath>
 #include <limits>
 
-#include "engine/base/interaction.h"
 #include "engine/forces/potentials/options.h"
+#include "engine/laws/interaction.h"
 
 namespace carom {
 

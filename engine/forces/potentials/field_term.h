@@ -15,7 +15,7 @@
 #include <utility>
 
 #include "engine/base/error.h"
-#include "engine/base/interaction.h"
+#include "engine/laws/interaction.h"
 
 namespace carom {
 

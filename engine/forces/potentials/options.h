@@ -9,10 +9,10 @@
 #include <string_view>
 #include <vector>
 
-#include "engine/base/interaction.h"
 #include "engine/forces/potentials/cut.h"
 #include "engine/forces/potentials/pair_term.h"
 #include "engine/forces/potentials/tail.h"
+#include "engine/laws/interaction.h"
 #include "engine/ranks/halo.h"
 #include "engine/search/neighbour_list.h"
 

@@ -34,8 +34,8 @@
 #include <vector>
 
 #include "engine/base/error.h"
-#include "engine/base/interaction.h"
 #include "engine/forces/pair_list.h"
+#include "engine/laws/interaction.h"
 #include "engine/ranks/communicator.h"
 
 namespace carom {

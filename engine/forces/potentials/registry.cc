@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // All types of interaction, in the order of the manual, one line each.
 
-#include "engine/base/interaction.h"
 #include "engine/forces/potentials/types.h"
+#include "engine/laws/interaction.h"
 
 namespace carom {
 

@@ -16,8 +16,8 @@
 #include <numbers>
 
 #include "engine/base/elementary.h"
-#include "engine/base/interaction.h"
 #include "engine/forces/potentials/cut.h"
+#include "engine/laws/interaction.h"
 
 namespace carom {
 

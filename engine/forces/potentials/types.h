@@ -2,7 +2,7 @@
 #pragma once
 // Declarations of all types of interaction. Each is defined in the file with its name; registry.cc lists them.
 
-#include "engine/base/interaction.h"
+#include "engine/laws/interaction.h"
 
 namespace carom::types {
 

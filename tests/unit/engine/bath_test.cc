@@ -6,9 +6,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "engine/base/bath_options.h"
 #include "engine/base/error.h"
 #include "engine/events/thermal_contact.h"
+#include "engine/laws/bath_options.h"
 #include "engine/run/baths.h"
 #include "tests/support/experiments.h"
 

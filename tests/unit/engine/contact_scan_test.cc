@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/slabs/contact_scan.h"
+#include "engine/stepping/contact_scan.h"
 
 #include <gtest/gtest.h>
 

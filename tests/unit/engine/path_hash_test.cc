@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Two ranks that have a particle compute equal hashes of its path if its events are equal, and only then.
 
-#include "engine/slabs/path_hash.h"
+#include "engine/stepping/path_hash.h"
 
 #include <gtest/gtest.h>
 

@@ -11,7 +11,7 @@
 #include "engine/base/random.h"
 #include "engine/run/radial_distribution.h"
 #include "engine/setup/compression.h"
-#include "engine/slabs/path_hash.h"
+#include "engine/stepping/path_hash.h"
 #include "tests/support/experiments.h"
 #include "tests/unit/potentials/cases.h"
 

@@ -8,7 +8,7 @@
 
 #include "engine/forces/forces.h"
 #include "engine/ranks/id_blocks.h"
-#include "engine/slabs/contact_scan.h"
+#include "engine/stepping/contact_scan.h"
 #include "tests/support/experiments.h"
 #include "tests/support/static_scenes.h"
 #include "tests/support/thread_ranks.h"

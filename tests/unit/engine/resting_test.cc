@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Reactions of resting contacts: closed forms, brute force over all sets of contacts, and what the stretch conserves.
 
-#include "engine/slabs/resting.h"
+#include "engine/stepping/resting.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // An abandoned slab restores its initial state.
 
-#include "engine/slabs/slab_watch.h"
+#include "engine/stepping/slab_watch.h"
 
 #include <gtest/gtest.h>
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Walls, boundaries and the record of contacts, as all users see them.
 
-#include "engine/base/wall.h"
+#include "engine/laws/wall.h"
 
 #include <gtest/gtest.h>
 
-#include "engine/base/box.h"
-#include "engine/base/counters.h"
 #include "engine/base/error.h"
+#include "engine/laws/box.h"
+#include "engine/laws/counters.h"
 
 namespace carom {
 namespace {

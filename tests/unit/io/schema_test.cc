@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
-#include "engine/base/interaction.h"
 #include "engine/integrators/integrator.h"
+#include "engine/laws/interaction.h"
 #include "engine/run/observable.h"
 
 namespace carom {

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "engine/base/interaction.h"
 #include "engine/forces/pair_filter.h"
+#include "engine/laws/interaction.h"
 
 namespace carom::test {
 

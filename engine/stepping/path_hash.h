@@ -5,8 +5,8 @@
 #include <bit>
 #include <vector>
 
-#include "engine/base/contact_log.h"
 #include "engine/base/particles.h"
+#include "engine/laws/contact_log.h"
 
 namespace carom {
 

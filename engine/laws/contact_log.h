@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "engine/base/box.h"
+#include "engine/laws/box.h"
 
 namespace carom {
 

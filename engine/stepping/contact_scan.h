@@ -9,13 +9,13 @@
 #include <functional>
 #include <vector>
 
-#include "engine/base/contact_log.h"
-#include "engine/base/counters.h"
 #include "engine/events/contact.h"
+#include "engine/laws/contact_log.h"
+#include "engine/laws/counters.h"
 #include "engine/ranks/system.h"
 #include "engine/search/neighbour_list.h"
-#include "engine/slabs/rest_criterion.h"
-#include "engine/slabs/slab_watch.h"
+#include "engine/stepping/rest_criterion.h"
+#include "engine/stepping/slab_watch.h"
 
 namespace carom {
 

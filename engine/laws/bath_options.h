@@ -2,8 +2,8 @@
 #pragma once
 // The parameters of a bath, as decks and Python give them.
 
-#include "engine/base/bath.h"
 #include "engine/base/parameters.h"
+#include "engine/laws/bath.h"
 
 namespace carom {
 

@@ -11,11 +11,11 @@
 #include <string>
 #include <vector>
 
-#include "engine/base/bath.h"
-#include "engine/base/boundary.h"
-#include "engine/base/contact_law.h"
 #include "engine/base/error.h"
-#include "engine/base/wall.h"
+#include "engine/laws/bath.h"
+#include "engine/laws/boundary.h"
+#include "engine/laws/contact_law.h"
+#include "engine/laws/wall.h"
 
 namespace carom {
 

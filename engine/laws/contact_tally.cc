@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/base/contact_tally.h"
+#include "engine/laws/contact_tally.h"
 
 #include "engine/base/error.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/base/box.h"
+#include "engine/laws/box.h"
 
-#include "engine/base/wall_options.h"
+#include "engine/laws/wall_options.h"
 
 namespace carom {
 namespace {

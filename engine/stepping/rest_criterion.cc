@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/slabs/rest_criterion.h"
+#include "engine/stepping/rest_criterion.h"
 
 #include <algorithm>
 #include <cmath>

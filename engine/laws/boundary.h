@@ -11,7 +11,7 @@ namespace carom {
 
 enum class Boundary : std::uint8_t { wall, periodic, open };
 
-/// The declaration of a boundary; engine/base/boundary.cc lists them all.
+/// The declaration of a boundary; engine/laws/boundary.cc lists them all.
 struct BoundaryInfo {
   Boundary boundary;
   std::string_view name;     ///< as in the deck: `boundary = ["…", …]`

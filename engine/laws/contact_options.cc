@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/base/contact_options.h"
+#include "engine/laws/contact_options.h"
 
 namespace carom {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/base/bath_options.h"
+#include "engine/laws/bath_options.h"
 
 #include "engine/base/error.h"
 

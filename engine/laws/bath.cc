@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/base/bath.h"
+#include "engine/laws/bath.h"
 
 #include <algorithm>
 #include <cmath>

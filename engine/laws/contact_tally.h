@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "engine/base/archive.h"
-#include "engine/base/contact_log.h"
 #include "engine/base/exact_sum.h"
+#include "engine/laws/contact_log.h"
 
 namespace carom {
 

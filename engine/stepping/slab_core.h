@@ -20,7 +20,7 @@
 #include <optional>
 
 #include "engine/ranks/system.h"
-#include "engine/slabs/contact_scan.h"
+#include "engine/stepping/contact_scan.h"
 
 namespace carom {
 

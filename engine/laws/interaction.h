@@ -20,11 +20,11 @@
 #include <string_view>
 #include <vector>
 
-#include "engine/base/box.h"
 #include "engine/base/exact_sum.h"
 #include "engine/base/force_sums.h"
 #include "engine/base/parameters.h"
 #include "engine/base/particles.h"
+#include "engine/laws/box.h"
 
 namespace carom {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/base/boundary.h"
+#include "engine/laws/boundary.h"
 
 #include <algorithm>
 

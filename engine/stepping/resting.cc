@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/slabs/resting.h"
+#include "engine/stepping/resting.h"
 
 #include <Eigen/SparseCholesky>
 #include <algorithm>

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <utility>
 
-#include "engine/base/contact_tally.h"
 #include "engine/base/event_counts.h"
+#include "engine/laws/contact_tally.h"
 
 namespace carom {
 

@@ -5,8 +5,8 @@
 #include <span>
 #include <string>
 
-#include "engine/base/box.h"
 #include "engine/base/parameters.h"
+#include "engine/laws/box.h"
 
 namespace carom {
 

@@ -7,11 +7,11 @@
 #include <utility>
 #include <vector>
 
-#include "engine/base/box.h"
-#include "engine/base/interaction.h"
 #include "engine/base/particles.h"
 #include "engine/events/contact.h"
-#include "engine/slabs/resting.h"
+#include "engine/laws/box.h"
+#include "engine/laws/interaction.h"
+#include "engine/stepping/resting.h"
 
 namespace carom {
 

@@ -16,7 +16,7 @@
 #include <span>
 #include <vector>
 
-#include "engine/base/contact_log.h"
+#include "engine/laws/contact_log.h"
 
 namespace carom {
 

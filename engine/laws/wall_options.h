@@ -2,8 +2,8 @@
 #pragma once
 // The parameters of a wall, as decks and Python give them.
 
-#include "engine/base/box.h"
 #include "engine/base/parameters.h"
+#include "engine/laws/box.h"
 
 namespace carom {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/base/wall_options.h"
+#include "engine/laws/wall_options.h"
 
 namespace carom {
 

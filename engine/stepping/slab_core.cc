@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "engine/slabs/slab_core.h"
+#include "engine/stepping/slab_core.h"
 
 #include <array>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include "engine/events/meeting.h"
 #include "engine/forces/forces.h"
 #include "engine/ranks/shared_contacts.h"
-#include "engine/slabs/path_hash.h"
+#include "engine/stepping/path_hash.h"
 
 namespace carom {
 
