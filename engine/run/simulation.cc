@@ -79,6 +79,13 @@ void check_rest_speeds(const System<D>& system) {
                                      short_text(thermal) + "; give a smaller one, or none");
 }
 
+/// Throws if the method refuses a force; fixed particles matter from count_moving() on.
+template <int D>
+void check_forces(const System<D>& system, const IntegratorInfo& info) {
+  for (const auto& term : system.interactions)
+    if (const std::string no = info.refusal(*term, system.has_fixed()); !no.empty()) throw Error(Failure::deck, no);
+}
+
 /// Throws if the bath kicks, or a wall oscillates, too often for the slab.
 template <int D>
 void check_rates(const Box<D>& box, const Slab& slab, bool stepping) {
@@ -128,6 +135,7 @@ template <int D>
 typename Simulation<D>::Prepared Simulation<D>::prepare(const System<D>& system, const IntegratorInfo& info,
                                                         Parameters given, Plan plan) {
   system.check();
+  check_forces(system, info);
   if (info.hard_cores) check_spheres(system);
   if (plan.step != 0 && given.has("step"))
     throw Error(Failure::deck, "the step is given twice; give it with the plan or with the integrator, not with both");
@@ -173,8 +181,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
     system_->count_moving();
     if (system_->moving() == 0 && system_->has_fixed())
       throw Error(Failure::deck, "all particles are fixed and nothing would move; give some a finite mass");
-    for (const auto& term : system_->interactions)
-      if (const auto no = info_.refusal(*term, system_->has_fixed()); !no.empty()) throw Error(Failure::deck, no);
+    check_forces(*system_, info_);
     if (!hooks.restore) check_rest_speeds(*system_);
     if (info_.smooth_forces) {
       system_->quanta = quanta(*system_);

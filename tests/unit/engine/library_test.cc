@@ -99,6 +99,14 @@ TEST(Library, MistakesAreErrorsWithARemedy) {
   expect_says(run_message(Failure::deck, with_gravity, "free-flight", {}), "knows no forces but a uniform-field");
 }
 
+TEST(Library, AForceThatTheMethodRefusesLeavesTheSystemToTheCaller) {
+  auto system = two_discs();
+  add_interaction(*system, "gravity", {{"constant", 1.0}});
+  EXPECT_THROW(Simulation<2>(std::move(system), "free-flight", {}, {.end_time = 3}), Error);
+  ASSERT_NE(system, nullptr);
+  Simulation<2>(std::move(system), "psa", {{"step", 0.1}}, {.end_time = 1}).run();
+}
+
 TEST(Library, EveryDefaultCanBeRead) {
   const auto complete = [](const auto& info) {
     Parameters given;
