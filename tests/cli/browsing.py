@@ -24,7 +24,7 @@ def picture(browser, selector=".panel canvas", settled=True):
     from PIL import Image
     from selenium.webdriver.common.by import By
     if settled:
-        wait_for(browser, "!dirty && panels.every(p => p.shown === Math.min(Math.floor(wanted), p.state.frames - 1))")
+        wait_for(browser, "!dirty && !showing && panels.every(p => p.shown === Math.min(Math.floor(wanted), p.state.frames - 1))")
     if selector.endswith("canvas"):
         address = browser.execute_script("drawAll(false); return document.querySelector(arguments[0]).toDataURL('image/png')", selector)
         image = base64.b64decode(address.split(",")[1])
@@ -69,9 +69,9 @@ def exported(browser, folder, deck=SPRINGS, *overrides):
     browser.get("about:blank")
     browser.get_log("browser")
     browser.get(target.as_uri())
-    wait_for(browser, "panels.length && panels.every(p => p.frame)")
+    wait_for(browser, "playing && panels.every(p => p.frame)")  # an exported page plays as soon as it has read everything
     browser.execute_script("goTo(0)")
-    wait_for(browser, "panels[0].shown === 0 && !dirty")
+    wait_for(browser, "panels[0].shown === 0 && !dirty && !showing")
     yield
     assert not [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
 

@@ -167,6 +167,13 @@ def test_help_and_keys(browser, tmp_path):
         assert browser.execute_script("return element('play').textContent") == "", "the sign is drawn, not written"
 
 
+def test_the_camera_is_fitted_to_the_first_frame(browser, tmp_path):
+    with exported(browser, tmp_path):
+        moved = browser.execute_script("""camera.fitted = false; wanted = 0; playing = true; advance(0.2);
+            const moved = wanted; camera.fitted = true; playing = false; wanted = 0; return moved""")
+        assert moved == 0, "playing waits for the camera"
+
+
 def test_one_collision_and_discs(browser, tmp_path):
     with exported(browser, tmp_path):
         browser.execute_script("panels[0].frame.collisions = 1; dirty = true")

@@ -6,6 +6,7 @@ const charts = {};        // by name; io/files/thermo.cc declares them, but for 
 const panels = [];
 let dirty = true;         // something has changed since the last drawing
 let playing = false;
+let showing = false;      // a frame is being read
 let wanted = 0;           // the frame to be shown; it has a fractional part while playing
 let lastMove = -Infinity;  // when the camera last moved [ms]
 const message = (text) => { element("message").textContent = text; };
@@ -57,7 +58,7 @@ function advance(seconds) {
   const last = frames() - 1;
   if (filming) return;
   if (element("follow").checked) wanted = Math.min(last, wanted + Math.max(1, (last - wanted) / 8));
-  else if (playing) wanted += seconds * element("speed").value;
+  else if (playing && camera.fitted) wanted += seconds * element("speed").value;  // the camera is fitted to the first frame
   if (playing && wanted > last) wanted = running() ? last : 0;
   wanted = Math.max(0, Math.min(last, wanted));
 }
@@ -76,10 +77,12 @@ async function animate() {
     const now = await new Promise(requestAnimationFrame);
     advance(Math.min(0.2, (now - before) / 1000));
     before = now;
+    showing = true;
     if (!filming) await Promise.all(panels.map((panel) => panel.show(Math.floor(wanted)))).catch(async (error) => {
       failed(error);
       await new Promise((done) => setTimeout(done, 250));
     });
+    showing = false;
     const rests = !playing && now - lastMove > 250;
     if (!dirty && !(coarse && rests)) continue;
     dirty = false;
