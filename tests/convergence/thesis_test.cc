@@ -18,7 +18,7 @@ std::unique_ptr<System<2>> experiment(const std::string& name) {
 
 /// The rows of a CSV file of the reference, without comments and header.
 std::vector<std::vector<std::string>> read_rows(const std::string& file) {
-  std::ifstream in(std::string(CAROM_TEST_DATA) + "/reference/" + file);
+  std::ifstream in(CAROM_TEST_DATA "/reference/" + file);
   std::vector<std::vector<std::string>> rows;
   bool head = true;
   for (std::string line; std::getline(in, line);) {

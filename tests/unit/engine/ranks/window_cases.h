@@ -4,7 +4,7 @@
 
 #include "engine/ranks/subdomain.h"
 #include "tests/support/thread_ranks.h"
-#include "tests/unit/engine/event_cases.h"
+#include "tests/unit/engine/events/event_cases.h"
 
 namespace carom {
 

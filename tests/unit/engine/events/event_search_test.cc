@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "engine/events/contact.h"
-#include "tests/unit/engine/event_cases.h"
+#include "tests/unit/engine/events/event_cases.h"
 
 namespace carom {
 namespace {

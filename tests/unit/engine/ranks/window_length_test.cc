@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/unit/engine/window_cases.h"
+#include "tests/unit/engine/ranks/window_cases.h"
 
 namespace carom {
 namespace {

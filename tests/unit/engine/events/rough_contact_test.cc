@@ -10,7 +10,7 @@
 #include "engine/events/meeting.h"
 #include "tests/support/experiments.h"
 #include "tests/support/thread_ranks.h"
-#include "tests/unit/engine/event_cases.h"
+#include "tests/unit/engine/events/event_cases.h"
 
 namespace carom {
 namespace {

@@ -9,7 +9,7 @@
 #include "engine/events/contact.h"
 #include "engine/events/event_core.h"
 #include "engine/search/simd/scan_kernel.h"
-#include "tests/unit/engine/event_cases.h"
+#include "tests/unit/engine/events/event_cases.h"
 
 namespace carom {
 namespace {

@@ -8,7 +8,7 @@
 #include "engine/ranks/bisection.h"
 #include "engine/run/simulation.h"
 #include "tests/support/thread_ranks.h"
-#include "tests/unit/engine/event_cases.h"
+#include "tests/unit/engine/events/event_cases.h"
 
 namespace carom {
 namespace {
