@@ -380,36 +380,15 @@ class Interpreter {
 
   void interaction(ValueTable& table) {
     const std::size_t before = problems_.errors();
-    if (table.variant->name == "table") read_points(table);
+    if (table.variant->name == "table")
+      if (const std::string wrong = read_points(table.values, deck_.file.parent_path(), reader_); !wrong.empty())
+        problems_.error(table.place("file"), wrong.substr(0, wrong.find("; ")), wrong.substr(wrong.find("; ") + 2));
     ids_exist(table);
     species_exist(table);
     source_.interactions.push_back({.info = &find_interaction(table.variant->name),
                                     .parameters = table.of_variant(),
                                     .at = table.at,
                                     .wrong = table.wrong || problems_.errors() > before});
-  }
-
-  /// Replaces the `file` of a table by its points, and sets a missing cutoff to the last point.
-  void read_points(ValueTable& table) {
-    if (const auto* name = table.find<std::string>("file")) {
-      if (table.given("r") || table.given("value")) {
-        problems_.error(table.place("file"), "'file' and the points themselves exclude each other",
-                        "leave one of them out");
-        return;
-      }
-      const std::filesystem::path file = deck_.file.parent_path() / *name;
-      const auto text = reader_(file);
-      if (!text)
-        throw Error(Failure::file, file.string() + ": error: cannot read the points of a potential; check 'file'");
-      std::vector<double> r, v;
-      for (const auto& row : rows_in(*text, file, 2, "not a point of a potential"))
-        r.push_back(row[0]), v.push_back(row[1]);
-      table.values.erase("file");
-      table.values.set("r", std::move(r));
-      table.values.set("value", std::move(v));
-    }
-    const auto* r = table.find<std::vector<double>>("r");
-    if (r != nullptr && !r->empty() && !table.given("cutoff")) table.values.set("cutoff", r->back());
   }
 
   void ids_exist(const ValueTable& table) {
@@ -532,6 +511,26 @@ class Interpreter {
 };
 
 }  // namespace
+
+std::string read_points(Parameters& table, const std::filesystem::path& folder, const TextReader& reader) {
+  if (const auto* name = table.find<std::string>("file")) {
+    if (table.has("r") || table.has("value"))
+      return "'file' and the points themselves exclude each other; leave one of them out";
+    const std::filesystem::path file = folder / *name;
+    const auto text = reader(file);
+    if (!text)
+      throw Error(Failure::file, file.string() + ": error: cannot read the points of a potential; check 'file'");
+    std::vector<double> r, v;
+    for (const auto& row : rows_in(*text, file, 2, "not a point of a potential"))
+      r.push_back(row[0]), v.push_back(row[1]);
+    table.erase("file");
+    table.set("r", std::move(r));
+    table.set("value", std::move(v));
+  }
+  const auto* r = table.find<std::vector<double>>("r");
+  if (r != nullptr && !r->empty() && !table.has("cutoff")) table.set("cutoff", r->back());
+  return {};
+}
 
 std::size_t Deck::Source::particles() const {
   std::size_t n = 0;

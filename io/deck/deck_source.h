@@ -94,6 +94,11 @@ void place_particles(const Deck::Source& source, System<D>& system, const Pause&
 template <int D>
 double default_distance(std::size_t particles, double volume);
 
+/// Replaces the `file` of a table potential, relative to `folder`, by its points, and sets a missing cutoff to the last
+/// point. Returns what is wrong, in the form "what; remedy", or nothing. Throws Error(Failure::file), and Failure::deck for
+/// errors in the file.
+std::string read_points(Parameters& table, const std::filesystem::path& folder, const TextReader& reader);
+
 /// The rows of a table of numbers: `columns` a line, separated by commas or blanks; # begins a comment, and the first
 /// line may be a heading. Throws Error(Failure::deck), which says that a line is `not_what` it should be.
 std::vector<std::vector<double>> rows_in(const std::string& text, const std::filesystem::path& file,

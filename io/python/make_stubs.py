@@ -38,7 +38,7 @@ PATHS = "str | os.PathLike[str]"
 # Of arguments whose default is None the type is this or None.
 ARGUMENTS = {"box": "npt.ArrayLike", "boundary": "Boundary | Sequence[Boundary]", "dimension": "Literal[2, 3]",
              "position": "npt.ArrayLike", "velocity": "npt.ArrayLike", "radius": "npt.ArrayLike", "mass": "npt.ArrayLike",
-             "charge": "npt.ArrayLike", "species": "str", "count": "int", "temperature": "float | Sequence[float]",
+             "display_radius": "npt.ArrayLike", "charge": "npt.ArrayLike", "species": "str", "count": "int", "temperature": "float | Sequence[float]",
              "rotational_temperature": "float",
              "deck": f"{PATHS} | Mapping[str, Any]", "file": PATHS, "set": "Mapping[str, Any]", "directory": PATHS,
              "take_over": "bool", "frame": "int", "time": "float", "steps": "int", "collisions": "int", "every": "float",

@@ -71,8 +71,8 @@ Plan plan_of(const py::dict& ends, double every) {
 /// the end of Python.
 template <int D>
 void run(Session<D>& session, const Plan& plan, const py::object& callback, const py::object& progress,
-         const py::object& deck) {
-  std::string text = session.needs_deck() ? deck().cast<std::string>() : "";
+         const py::object& deck, const std::string& script) {
+  const std::string text = session.needs_deck() ? py::cast<std::string>(deck(session.writes_files())) : "";
   using Clock = std::chrono::steady_clock;
   constexpr std::chrono::milliseconds kTimeBetweenChecks(50);
   std::optional<py::error_already_set> raised;
@@ -86,6 +86,7 @@ void run(Session<D>& session, const Plan& plan, const py::object& callback, cons
   bool cut = false;
   RunHooks hooks;
   hooks.deck = [&] { return text; };
+  hooks.script = script;
   hooks.stop = [&](const Statistics& statistics) {
     cut = cut || python_is_ending();
     if (cut || raised) return true;
@@ -171,16 +172,17 @@ void bind(py::module_& module, const char* name) {
            })
       .def("run",
            [](S& session, const py::dict& ends, const py::object& callback, const py::object& progress,
-              const py::object& deck) {
+              const py::object& deck, const std::string& script) {
              Plan plan = plan_of(ends, session.plan().thermo_interval);
              if (!plan.end_time && !plan.steps && !plan.collisions) {
                plan.end_time = session.plan().end_time;
                plan.steps = session.plan().steps;
                plan.collisions = session.plan().collisions;
              }
-             run(session, plan, callback, progress, deck);
+             run(session, plan, callback, progress, deck, script);
            })
       .def("set_output", &S::set_output)
+      .def_property_readonly("begun", &S::begun)
       .def("forget_run", &S::forget_run)
       .def("drawn_velocities",
            [](S& session, const Array& temperature, std::uint64_t seed) {
@@ -252,6 +254,7 @@ void bind(py::module_& module, const char* name) {
       .def_property_readonly("interval", [](const S& s) { return s.plan().thermo_interval; })
       .def_property_readonly("size", &S::size)
       .def_property_readonly("directory", &S::directory)
+      .def_property_readonly("deck_output", [](const S& s) { return values_of(s.deck_output()); })
       .def_property_readonly("warnings", &S::warnings)
       .def_property_readonly("species", &S::species)
       .def_property_readonly("method",
@@ -295,14 +298,14 @@ void bind(py::module_& module, const char* name) {
       });
 }
 
-/// A session, its warnings, and the title.
+/// A session, its warnings, the title and the description.
 py::tuple opened(Deck& deck, auto&&... from) {
   py::object session;
   if (deck.dimension == 2)
     session = py::cast(std::make_unique<Session<2>>(deck, from...));
   else
     session = py::cast(std::make_unique<Session<3>>(deck, from...));
-  return py::make_tuple(session, deck.warnings, deck.title);
+  return py::make_tuple(session, deck.warnings, deck.title, deck.description);
 }
 
 /// The simulation of a deck, given as a file or as text.
@@ -384,6 +387,18 @@ py::dict descriptors() {
   return all;
 }
 
+/// Every key of a deck: {table: {variant: [keys]}}; keys of all variants are those of the variant "".
+py::dict schema() {
+  py::dict all;
+  for (const TableSchema& table : deck_schema()) {
+    py::dict variants;
+    variants[""] = described(table.keys);
+    for (const Variant& variant : table.variants) variants[py::str(variant.name)] = described(variant.keys);
+    all[py::str(table.name)] = variants;
+  }
+  return all;
+}
+
 /// Raises the exception of carom.errors for the failure, with the text of the error.
 void raise(const Error& error) {
   const py::object errors = py::module_::import("carom.errors");
@@ -412,6 +427,7 @@ PYBIND11_MODULE(_carom, module) {
   module.def("view", serve_page);
   module.def("spline", spline);
   module.def("descriptors", descriptors);
+  module.def("schema", schema);
   py::dict meanings;
   for (const carom::Column<3>& column : carom::columns<3>())
     if (column.python) meanings[column.python] = std::string(column.meaning) + " [" + column.unit + "]";

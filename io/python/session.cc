@@ -82,6 +82,11 @@ Session<D>::Session(Deck& deck, const std::optional<GivenState>& given, const Pa
   terms_ = Terms<D>(deck, *system_);
   text_ = deck.toml_text;
   file_ = deck.file.string();
+  const ValueTable& output = *deck.source->values.find("output");
+  for (const auto& [key, place] : output.places)
+    if (const auto value = output.values.all().find(key); value != output.values.all().end())
+      deck_output_.set(key, value->second);
+  deck_output_.set("directory", deck.output.directory.string());
   views_.rest(system_->particles);
 }
 
@@ -292,6 +297,8 @@ void Session<D>::set_contacts(std::vector<Parameters> all) {
 template <int D>
 void Session<D>::add_force(std::string_view type, Parameters given) {
   const InteractionInfo& info = find_interaction(type);
+  if (info.name == "table")
+    if (const std::string wrong = read_points(given, {}, read_text); !wrong.empty()) refuse("table: " + wrong);
   Parameters complete = completed(info.name, info.parameters, std::move(given));
   if (size_ == 0) refuse(std::string(type) + ": there are no particles yet; call add_particles() first");
   change("add forces");
@@ -334,12 +341,16 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
   if (size_ == 0) refuse("there are no particles; call add_particles() first");
   if (!failure_.empty())
     refuse("the last run has failed (" + failure_ + "); give positions, velocities or an integrator to start anew");
-  const bool begun = shown_until_ >= 0;
+  const bool begun = this->begun();
   if (begun && reached(plan))
     refuse("the run is at time " + short_text(statistics_.end_time) + ", step " + std::to_string(statistics_.steps) +
            " already; give a later end, or change something to start anew");
   terms_.complete(*system_);
-  if (output_) describe(plan, begun, hooks);
+  deck_warnings_.clear();
+  if (output_)
+    describe(plan, begun, hooks);
+  else if (!begun && text_.empty())
+    warn_of_start(hooks);
   Parameters parameters = parameters_;
   if (!integrator_->stepping) choose_epoch(*system_, parameters, begun ? step_ : 0);
   step_ = parameters.real("step");
@@ -422,9 +433,9 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
 /// Keeps the warnings of a run with or without files.
 template <int D>
 void Session<D>::warn(const RunRecord<D>* record) {
-  warnings_.clear();
+  warnings_ = deck_warnings_;
   if (record)
-    warnings_ = record->warnings();
+    warnings_.insert(warnings_.end(), record->warnings().begin(), record->warnings().end());
   else if (const auto overlap = overlap_warning(live_ ? *live_ : statistics_, box_))
     warnings_.push_back(*overlap);
 }

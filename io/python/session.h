@@ -36,7 +36,8 @@ struct Columns {
 struct RunHooks {
   std::function<bool(const Statistics&)> stop;  ///< before each step; true: the run ends there
   std::function<void()> show;                   ///< at the intervals of the plan; the session then shows that time
-  std::function<std::string()> deck;            ///< the present state as a deck, if the run writes files
+  std::function<std::string()> deck;            ///< the present state as a deck; a run without files needs only counts
+  std::string script;                           ///< the file that describes the run, unless it is a deck
 };
 
 /// The averages that a run computes, by name.
@@ -75,8 +76,8 @@ class Session {
   void add_contact(Parameters given);
   void add_force(std::string_view type, Parameters given);
   void set_integrator(std::string_view name, Parameters given);
-  /// Makes later runs write files: `set` overrides [output] of a deck, including the directory; thermo rows and calls
-  /// of RunHooks::show come at this interval.
+  /// Makes later runs write files: `set` overrides [output] of a deck, including the directory; thermo rows and
+  /// calls of RunHooks::show come at this interval.
   void set_output(std::vector<std::string> set, double thermo_interval);
 
   /// Drops the settings of a deck for the run and its integrator, which must be set again.
@@ -87,7 +88,11 @@ class Session {
     text_.clear();
   }
   /// Whether run() will call RunHooks::deck.
-  bool needs_deck() const { return output_ && text_.empty() && shown_until_ < 0; }
+  bool needs_deck() const { return text_.empty() && !begun(); }
+  /// Whether the next run() continues one.
+  bool begun() const { return shown_until_ >= 0; }
+  /// Whether runs write files.
+  bool writes_files() const { return output_.has_value(); }
   /// Runs to the end of the plan, counted in the time and steps of the whole run, so that a later end continues the
   /// run. The step of the plan is ignored.
   void run(Plan plan, const RunHooks& hooks);
@@ -120,10 +125,12 @@ class Session {
   std::vector<Parameters> baths() const;
   /// During a run: only in RunHooks::show.
   Averages averages() const;
-  /// Warnings of the last run; without files only of overlaps.
+  /// Warnings of the last run.
   const std::vector<std::string>& warnings() const { return warnings_; }
   /// The directory of the files; empty: no files.
   std::string directory() const { return deck_ ? deck_->output.directory.string() : std::string(); }
+  /// The keys of [output] that the deck gives, and its directory.
+  const Parameters& deck_output() const { return deck_output_; }
   /// The plan of the deck; without a deck it has no end.
   const Plan& plan() const { return plan_; }
 
@@ -139,6 +146,8 @@ class Session {
   Bytes saved(const std::string& name, double interval) const;
   void rest(Particles<D>& particles);
   void warn(const RunRecord<D>* record);
+  void warn_of_start(const RunHooks& hooks);
+  void warn_of_deck(const std::vector<std::string>& warnings);
   void show(const Snapshot<D>& shot, const RunHooks& hooks);
   void describe(Plan& plan, bool begun, const RunHooks& hooks);
   void push(const Simulation<D>& run);
@@ -179,7 +188,8 @@ class Session {
   std::shared_ptr<Checkpoint> checkpoint_;          // holds that state until the first run
   const RunRecord<D>* record_ = nullptr;            // record of the active run
   Averages averages_;
-  std::vector<std::string> warnings_;
+  std::vector<std::string> deck_warnings_, warnings_;  // of the start of a run; of a run
+  Parameters deck_output_;
 };
 
 }  // namespace carom::python

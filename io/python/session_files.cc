@@ -4,6 +4,7 @@
 #include "engine/laws/bath_options.h"
 #include "engine/setup/placement.h"
 #include "io/deck/deck_source.h"
+#include "io/deck/validate_state.h"
 #include "io/python/session.h"
 
 namespace carom::python {
@@ -67,6 +68,21 @@ void change_value(const Fields& fields, const std::string& name, const std::func
   }
 }
 
+/// The deck that the session has written; the places in its errors would say nothing.
+Deck written_deck(const RunHooks& hooks, std::span<const std::string> set) {
+  try {
+    return read_deck(hooks.script, set, [&](const std::filesystem::path&) { return std::optional(hooks.deck()); });
+  } catch (const Error& error) {
+    std::string what = error.what();
+    for (std::size_t line = 0; line != std::string::npos; line = what.find('\n', line)) {
+      if (line > 0) ++line;
+      const std::size_t end = what.find('\n', line), sign = what.find(": error: ", line);
+      if (sign < end) what.erase(line, sign + 9 - line);
+    }
+    throw Error(error.failure(), what);
+  }
+}
+
 }  // namespace
 
 template <int D>
@@ -99,16 +115,16 @@ void Session<D>::set_output(std::vector<std::string> set, double thermo_interval
 template <int D>
 void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
   if (!begun) {
-    const std::filesystem::path file = text_.empty() ? "simulation.py" : file_;
-    const std::string text = text_.empty() ? hooks.deck() : text_;
-    Deck deck = read_deck(file, *output_, [&](const std::filesystem::path& path) {
-      return path == file ? std::optional(text) : read_text(path);
-    });
+    Deck deck = text_.empty() ? written_deck(hooks, *output_)
+                              : read_deck(file_, *output_, [&](const std::filesystem::path& path) {
+                                  return path == file_ ? std::optional(text_) : read_text(path);
+                                });
     set_ends(deck, plan);
     build_system<D>(deck, nullptr, nullptr, [&] {
       if (hooks.stop && hooks.stop(statistics_))
         throw Error(Failure::interrupted, "stopped while the particles were placed; no file was written");
     });
+    if (text_.empty()) warn_of_deck(deck.warnings);
     deck_ = std::move(deck);
   } else {
     set_tables(*deck_, "contact", contacts_);  // laws and the bath may have changed since the last run
@@ -127,6 +143,30 @@ void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
   plan.thermo_interval = of.thermo_interval;
   plan.events = of.events;
   plan.from_equilibrium = of.from_equilibrium;
+}
+
+/// Takes over warnings about a deck that the session has written itself, so that their places say nothing.
+template <int D>
+void Session<D>::warn_of_deck(const std::vector<std::string>& warnings) {
+  for (const std::string& each : warnings) {
+    const std::size_t what = each.find("warning: ");
+    deck_warnings_.push_back(what == std::string::npos ? each : each.substr(what));
+  }
+}
+
+/// The warnings that a deck of this simulation would get before its run. They are found on a copy of the system.
+template <int D>
+void Session<D>::warn_of_start(const RunHooks& hooks) {
+  const Deck deck = written_deck(hooks, {});
+  System<D> copy;
+  copy.box = box_;
+  copy.species = species_;
+  copy.particles = system_->particles;
+  copy.need_spins();
+  terms_.make(copy);
+  Problems problems;
+  warn_of_state(deck, copy, problems);
+  warn_of_deck(problems.warnings());
 }
 
 /// Sets the velocities from a callback, between two steps. The added energy counts as work, like that of moving walls,

@@ -15,7 +15,7 @@
 #include "engine/setup/placement.h"
 #include "tests/convergence/fluid.h"
 
-namespace carom {
+namespace carom::charged_mixture_test {
 namespace {
 
 using test::Mean;
@@ -139,4 +139,4 @@ TEST(ChargedMixture, ComesToEquilibrium) { expect_equilibrium(3000, 1, 0.002, 0.
 TEST(ChargedMixtureSlow, ComesToEquilibrium) { expect_equilibrium(test::slow_collisions(1e6), 0.25, 0.001, 0.01); }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::charged_mixture_test

@@ -11,7 +11,7 @@
 #include "engine/setup/placement.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::edda_springs_test {
 namespace {
 
 /// Discs on a square lattice with this number of rows, springs between neighbours, temperature 1, periodic.
@@ -178,4 +178,4 @@ TEST(Edda, ParticlesWhosePartnersSwapAreFrozenAndTheEnergyStaysExact) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::edda_springs_test

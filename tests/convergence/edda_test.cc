@@ -9,7 +9,7 @@
 #include "engine/run/state.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::edda_test {
 namespace {
 
 /// The collisions of a run in the order in which they were reported.
@@ -376,4 +376,4 @@ TEST(Edda, EnergyThatIsTooMuchForTheVelocitiesStaysCarriedOver) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::edda_test

@@ -10,7 +10,7 @@
 #include "engine/setup/placement.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::electrolyte_test {
 namespace {
 
 /// The restricted primitive model with n ions at this number density, l_B/d = 1.68, at random on fcc sites.
@@ -87,4 +87,4 @@ TEST(Electrolyte, EnergyErrorsOfPsaAreOfFirstOrderAndOfCvaAndMcvaOfSecond) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::electrolyte_test

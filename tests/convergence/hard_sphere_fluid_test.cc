@@ -18,7 +18,7 @@
 #include "engine/run/radial_distribution.h"
 #include "tests/convergence/fluid.h"
 
-namespace carom {
+namespace carom::hard_sphere_fluid_test {
 namespace {
 
 using test::Mean;
@@ -269,4 +269,4 @@ TEST(HardSphereFluid, AMillionCollisionsKeepEverything) { expect_kept(1000000); 
 TEST(HardSphereFluidSlow, AHundredMillionCollisionsKeepEverything) { expect_kept(test::slow_collisions(1e8)); }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::hard_sphere_fluid_test

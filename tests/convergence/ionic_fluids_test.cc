@@ -13,7 +13,7 @@
 #include "engine/setup/placement.h"
 #include "tests/convergence/fluid.h"
 
-namespace carom {
+namespace carom::ionic_fluids_test {
 namespace {
 
 /// n = 4 c³ particles of mass 1 at temperature 1 and this number density, on the sites of an fcc lattice; the charges
@@ -176,4 +176,4 @@ TEST(CounterIons, BetweenChargedWallsFollowPoissonAndBoltzmann) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::ionic_fluids_test

@@ -13,7 +13,7 @@
 #include "tests/convergence/fluid.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::ledger_test {
 namespace {
 
 using test::set_law;
@@ -401,4 +401,4 @@ TEST(PileSlow, OfManyFallingDiscsComesToRestWithEdda) { fall_and_rest("edda", kM
 TEST(PileSlow, OfManyFallingDiscsComesToRestWithPsa) { fall_and_rest("psa", kMany); }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::ledger_test

@@ -13,7 +13,7 @@
 #include "engine/setup/placement.h"
 #include "tests/convergence/fluid.h"
 
-namespace carom {
+namespace carom::lennard_jones_test {
 namespace {
 
 using test::Given;
@@ -126,4 +126,4 @@ TEST(LennardJones, HasTheEnergyAndPressureOfNistAtDensity086) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::lennard_jones_test

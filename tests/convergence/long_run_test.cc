@@ -7,7 +7,7 @@
 
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::long_run_test {
 namespace {
 
 TEST(LongRun, AMillionStepsOfBothExperiments) {
@@ -51,4 +51,4 @@ TEST(LongRun, TheEnergyErrorGrowsNoFasterThanTheRootOfTheSteps) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::long_run_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::order_test {
 namespace {
 
 using test::Given;
@@ -126,4 +126,4 @@ TEST(Order, PositionsOfCddaOrderFourAcrossCollisions) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::order_test

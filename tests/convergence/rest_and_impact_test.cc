@@ -7,7 +7,7 @@
 #include "tests/support/experiments.h"
 #include "tests/support/static_scenes.h"
 
-namespace carom {
+namespace carom::rest_and_impact_test {
 namespace {
 
 template <int D>
@@ -108,4 +108,4 @@ TEST(Impact, OnARowThatFillsTheBoxIsRefused) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::rest_and_impact_test

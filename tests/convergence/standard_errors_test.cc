@@ -14,7 +14,7 @@
 #include "engine/run/observable.h"
 #include "tests/convergence/fluid.h"
 
-namespace carom {
+namespace carom::standard_errors_test {
 namespace {
 
 constexpr unsigned kRuns = 100;
@@ -98,4 +98,4 @@ TEST(StandardErrors, UnderForces) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::standard_errors_test

@@ -11,7 +11,7 @@
 #include "engine/run/observable.h"
 #include "tests/convergence/fluid.h"
 
-namespace carom {
+namespace carom::structure_factor_fluid_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -127,4 +127,4 @@ TEST(StructureFactorOfTheFluid, IsThatOfVerletAndWeis) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::structure_factor_fluid_test

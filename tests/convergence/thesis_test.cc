@@ -9,7 +9,7 @@
 
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::thesis_test {
 namespace {
 
 std::unique_ptr<System<2>> experiment(const std::string& name) {
@@ -121,4 +121,4 @@ TEST(Thesis, UnequalSpheresInThreeDimensionsDoTheSame) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::thesis_test

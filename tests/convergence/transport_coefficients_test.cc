@@ -18,7 +18,7 @@
 #include "engine/run/observable.h"
 #include "tests/convergence/fluid.h"
 
-namespace carom {
+namespace carom::transport_coefficients_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -121,4 +121,4 @@ TEST(TransportCoefficientsSlow, FromADiluteToADenseFluid) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::transport_coefficients_test

@@ -275,3 +275,47 @@ def test_a_page_shows_the_run(tmp_path):
         urllib.request.urlopen(page.address, timeout=5)
     sim.open().view(export=tmp_path / "page.html")
     assert "<!doctype html>" in (tmp_path / "page.html").read_text()
+
+
+def with_output(**output):
+    return {"format": 1, "system": {"dimension": 2, "box": [12.0, 6.0], "boundary": ["periodic", "wall"]},
+            "particles": [{"name": "disc", "position": [[2.0, 3.0], [6.0, 3.0]], "velocity": [[1.0, 0.5], [0.0, 0.0]], "radius": 0.5}],
+            "integrator": {"type": "psa", "step": 0.01}, "run": {"end_time": 1.0}} | ({"output": output} if output else {})
+
+
+def test_the_output_of_a_deck_is_kept(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    deck = with_output(directory="files", thermo_interval=0.25, msd_interval=0.1, events=True)
+    sim = carom.Simulation.from_deck(deck)
+    sim.run()
+    assert sim.directory is None and not (tmp_path / "files").exists(), "scans of a deck would write into one directory"
+    sim.output()
+    sim.run()
+    assert sim.directory == str(tmp_path / "files") and len(sim.averages["msd"]["msd"]) and (tmp_path / "files/events.h5").exists()
+    assert len(sim.open().thermo["time"]) == 5
+    sim.output("others", rdf_interval=0.1)
+    sim.run()
+    assert {"msd", "rdf"} <= sim.averages.keys() and len(sim.open().thermo["time"]) == 5
+    with pytest.raises(carom.UsageError, match="there is no 'directory'; give one"):
+        five_springs().output()
+
+
+def test_the_interval_of_calls_is_that_of_the_rows(tmp_path):
+    sim = carom.Simulation.from_deck(with_output(directory=str(tmp_path / "run"), thermo_interval=0.25))
+    sim.output()
+    times = []
+    sim.run(every=0.5, callback=lambda s: times.append(s.time))
+    assert np.allclose(times, [0, 0.5, 1]) and np.allclose(sim.open().thermo["time"], times)
+    with pytest.raises(carom.UsageError, match="the rows of thermo.csv come every 0.5"):
+        sim.run(time=2, every=0.25, callback=print)
+    sim.output(thermo_interval=0.25)
+    with pytest.raises(carom.UsageError, match="the rows of thermo.csv come every 0.25"):
+        sim.run(time=2, every=0.5, callback=print)
+
+
+def test_the_files_name_the_script(tmp_path):
+    script = tmp_path / "scan.py"
+    script.write_text("import carom\nsim = carom.Simulation(box=[12, 6])\nsim.add_particles(position=[[2, 3]])\n"
+                      "sim.integrator('psa', step=0.01)\nsim.output('run')\nsim.run(steps=5)\n")
+    subprocess.run([sys.executable, script], cwd=tmp_path, check=True)
+    assert "scan.py" in (tmp_path / "run/run.log").read_text() and "simulation.py" not in (tmp_path / "run/run.log").read_text()

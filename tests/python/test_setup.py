@@ -154,3 +154,36 @@ def test_an_expression_keeps_its_energy():
 def test_mistakes_in_expressions(expression, given, message):
     with pytest.raises(carom.UsageError, match=message):
         pair(expression, **({"start": 0.5, "cutoff": 2.0} | given))
+
+
+def test_points_of_a_potential_come_from_a_file(tmp_path):
+    (tmp_path / "points.txt").write_text("# r V\n0.5 3.0\n1.0 1.0\n2.0 0.0\n")
+    sim = carom.Simulation(box=[12, 6])
+    sim.add_particles(position=[[2, 3], [3.5, 3]])
+    sim.add_force("table", file=str(tmp_path / "points.txt"))
+    assert sim._session.forces == [("table", {"r": [0.5, 1.0, 2.0], "value": [3.0, 1.0, 0.0], "cutoff": 2.0, "exclude": "none", "cut": "switch"})]
+    with pytest.raises(carom.UsageError, match="exclude each other; leave one of them out"):
+        sim.add_force("table", file="points.txt", r=[1.0, 2.0], value=[1.0, 0.0])
+    with pytest.raises(carom.FileError, match="no.txt: error: cannot read the points"):
+        sim.add_force("table", file="no.txt")
+
+
+def test_simulations_by_calls_get_the_warnings_of_decks():
+    sim = five_springs()
+    sim.integrator("edda", step=1.0)
+    with pytest.warns(carom.CaromWarning, match="^step 1 is long for the shortest period at the start, 3.30"):
+        sim.run(steps=1)
+    assert len(sim.warnings) == 1
+    sim = five_springs()
+    sim.run(steps=1)
+    assert sim.warnings == []
+
+
+def test_the_radius_of_points_in_pictures(tmp_path):
+    sim = carom.Simulation(box=[12, 6], boundary="periodic")
+    sim.add_particles(position=[[2, 3], [3.5, 3]], display_radius=0.2)
+    sim.integrator("verlet", step=0.01)
+    sim.run(steps=1)
+    assert sim.radius.tolist() == [0.2, 0.2]
+    with pytest.raises(carom.UsageError, match="'radius' and 'display_radius' exclude each other"):
+        sim.add_particles(position=[[5, 3]], radius=0.5, display_radius=0.2)

@@ -4,6 +4,7 @@
 import itertools
 import json
 import pathlib
+import sys
 
 import numpy as np
 
@@ -39,11 +40,15 @@ def _is_table(value):
     return isinstance(value, dict) or (isinstance(value, list) and bool(value) and isinstance(value[0], dict))
 
 
-def deck_of(sim, of, ends):
-    """The deck of a simulation: its present state without the images, forces, integrator, and the end of a run."""
+def deck_of(sim, of, ends, whole=True):
+    """The deck of a simulation: its present state without the images, forces, integrator, and the end of a run. If it is not `whole`,
+    the number of particles replaces their positions and velocities."""
     if not sim._session.method:
         raise UsageError(f"{of}: there is no integrator; call integrator(name, step=…) first")
-    deck = {"format": 1, "title": sim.title, "system": system_of(sim), "particles": species_of(sim, of)}
+    deck = {"format": 1, "title": sim.title, "description": sim.description, "system": system_of(sim),
+            "particles": species_of(sim, of) if whole else counts_of(sim)}
+    if not whole and len(sim):
+        deck["placement"] = {"type": "random"}
     if sim._session.method == "verlet":
         for species in deck["particles"]:
             species["display_radius"] = species.pop("radius")
@@ -92,12 +97,21 @@ def species_of(sim, of):
     return species
 
 
+def counts_of(sim):
+    """The tables [[particles]] of a deck whose particles are somewhere."""
+    numbers, fixed = np.bincount(sim.species, minlength=len(sim.species_names)), np.isinf(sim.mass)
+    radius = float(sim.radius.max(initial=0.5))
+    return [{"name": name, "count": int(count), "temperature": 0.0, "radius": radius, "fixed": bool(fixed[sim.species == kind].all())}
+            for kind, (name, count) in enumerate(zip(sim.species_names, numbers)) if count]
+
+
 def write_deck(sim, file, ends, every):
     """See Simulation.write_deck()."""
     if all(end is None for end in ends.values()):
-        raise UsageError("write_deck: the deck has no end; give time or steps")
+        raise UsageError("write_deck: the deck has no end; give time, steps or collisions")
     deck = deck_of(sim, "write_deck", ends)
-    deck["output"] = {"frame_interval": float(every), "thermo_interval": float(every)}
+    output = sim._deck_output if sim._output is None else sim._output
+    deck["output"] = {key: output[key] for key in output if key != "directory"} | ({} if every is None else {"frame_interval": float(every), "thermo_interval": float(every)})
     try:
         pathlib.Path(file).write_text(toml_text(deck))
     except OSError as error:
@@ -107,3 +121,12 @@ def write_deck(sim, file, ends, every):
 def overrides(values):
     """The values in the form of the option `--set`; texts are not quoted."""
     return [f"{key}={value if isinstance(value, str) else toml_value(value)}" for key, value in values.items()]
+
+
+def script_name():
+    """The file of the program that runs, relative to the working directory if it is below; simulation.py in a notebook."""
+    file = getattr(sys.modules["__main__"], "__file__", None)
+    if not file:
+        return "simulation.py"
+    path = pathlib.Path(file).resolve()
+    return str(path.relative_to(pathlib.Path.cwd())) if path.is_relative_to(pathlib.Path.cwd()) else str(path)

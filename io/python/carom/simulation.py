@@ -11,7 +11,7 @@ import numpy as np
 
 from carom import files, formats, notebook, page, potentials
 from carom.checks import name_of, numbers, one_or_each, refuse_masked, refuse_ranks
-from carom.decks import deck_of, overrides, species_of, surroundings_of, system_of, toml_text, toml_value, write_deck
+from carom.decks import deck_of, script_name, overrides, species_of, surroundings_of, system_of, toml_text, toml_value, write_deck
 from carom.errors import CaromWarning, UsageError
 from carom.progress import Progress
 
@@ -69,11 +69,11 @@ class Simulation:
         self._start(kind(list(edges), rules))
         self._edges_known = box is not None
 
-    def _start(self, session, title=""):
+    def _start(self, session, title="", description=""):
         refuse_ranks()
-        self._session, self.title, self.warnings = session, title, []
+        self._session, self.title, self.description, self.warnings = session, title, description, []
         self._cores = False  # a radius was given
-        self._output = None  # the arguments of set_output()
+        self._deck_output, self._output = {}, None  # the keys of [output] of the deck, and those that hold; None: no files
         self._edges_known, self._counted, self._spinning, self._inertias, self.bonds = True, [], [], {}, np.empty((0, 2), int)
 
     def _warn(self, texts, level=3):
@@ -85,13 +85,15 @@ class Simulation:
     def from_deck(cls, deck, set=None):
         """The simulation that a deck describes. `set` changes values of the deck: set={"integrator.step": 0.02}.
 
-        deck: the path of a file, or a dictionary in the form that tomllib.load() returns.
+        deck: the path of a file, or a dictionary in the form that tomllib.load() returns. Its [output] is kept for output(), without which
+        run() writes no files.
         """
         self = cls.__new__(cls)
         refuse_masked("from_deck", set or {})
         text = toml_text(deck) if isinstance(deck, collections.abc.Mapping) else None
-        session, texts, title = _carom.from_deck("deck" if text else os.fspath(deck), overrides(set or {}), text)
-        self._start(session, title)
+        session, texts, title, description = _carom.from_deck("deck" if text else os.fspath(deck), overrides(set or {}), text)
+        self._start(session, title, description)
+        self._deck_output = session.deck_output
         self._warn(texts)
         return self
 
@@ -107,8 +109,8 @@ class Simulation:
             sim.run(time=200)
         """
         self = cls.__new__(cls)
-        session, _, title = _carom.from_run(os.fspath(directory), take_over)
-        self._start(session, title)
+        session, _, title, description = _carom.from_run(os.fspath(directory), take_over)
+        self._start(session, title, description)
         return self
 
     @classmethod
@@ -117,14 +119,14 @@ class Simulation:
         return formats.read(cls, file, frame, radius, boundary, atom_style)
 
     def add_particles(self, position=None, velocity=None, radius=None, mass=1.0, charge=0.0, species="particle", count=None,
-                      temperature=None, spin=None, inertia=None, rotational_temperature=None, fixed=False):
+                      temperature=None, spin=None, inertia=None, rotational_temperature=None, fixed=False, display_radius=None):
         """Adds N particles; returns the range of their ids.
 
         position, velocity: arrays of shape (N, D) [length, length/time]; the default velocity is 0.
         radius, mass, charge: one number for all, or N numbers. The default radius is 0.5; leave it out for verlet, which has no hard
         cores. species: the name of their species, for forces between species.
         spin: angular velocities [1/time], (N,) in two dimensions, about z, and (N, 3) in three. Contacts with "tangential" change them.
-        fixed: they never move, and others bounce off them; their mass is infinite.
+        fixed: they never move, and others bounce off them; their mass is infinite. display_radius: with verlet, the radius in pictures.
         inertia: reduced moment of inertia 4I/(m sigma²) of the species; the default is that of a homogeneous body.
         count, temperature, rotational_temperature: replace positions, velocities and spins, which place() then chooses. Without
         rotational_temperature the particles do not spin.
@@ -137,8 +139,11 @@ class Simulation:
                                 ("rotational_temperature", rotational_temperature)):
                 if value is not None and np.any(value):
                     raise UsageError(f"add_particles: '{name}' of fixed particles; leave it out")
+        if radius is not None and display_radius is not None:
+            raise UsageError("add_particles: 'radius' and 'display_radius' exclude each other; verlet's particles, which are points, have "
+                             "the second one")
         self._cores |= radius is not None
-        radius = 0.5 if radius is None else radius
+        radius = next((one for one in (radius, display_radius) if one is not None), 0.5)
         if count is not None:
             return self._count(count, position, velocity, temperature,
                                {"name": species, "radius": radius, "mass": mass, "charge": charge, "fixed": bool(fixed)},
@@ -236,7 +241,7 @@ class Simulation:
         deck.pop("bath", None)  # it has no part in the placement
         if packing_fraction is not None:
             deck["placement"]["packing_fraction"] = packing_fraction
-        session, texts, _ = _carom.from_deck("place", [], toml_text(deck))
+        session, texts, *_ = _carom.from_deck("place", [], toml_text(deck))
         session.forget_run()
         for name, inertia in self._inertias.items():
             if inertia:
@@ -253,7 +258,7 @@ class Simulation:
         if old.method:
             session.set_integrator(old.method, old.method_parameters)
         if self._output:
-            session.set_output(*self._output)
+            self._set_output(session)
         self._session, self._edges_known, self._counted, self._spinning, self._inertias = session, True, [], [], {}
         self._warn(texts)
         return range(len(self))
@@ -343,9 +348,10 @@ class Simulation:
         self.add_force("table", r=points.r, value=points.value, cutoff=cutoff, **slope, **(options or {}))
         return points
 
-    def output(self, directory, thermo_interval=0, **keys):
+    def output(self, directory=None, thermo_interval=None, **keys):
         """Makes the next runs write the files of `carom run` to a directory: see carom.open().
 
+        What is not given here is as in [output] of the deck: output() alone writes the files of the deck.
         thermo_interval: time between rows of thermo.csv; callbacks are then called at each row. Other keys are those of
         [output] in decks: frame_interval, events, rdf_interval, sk_interval, msd_interval, profile_interval,
         transport_interval, pressure_tensor_interval, start, sample_start, checkpoint_wall, units, … (`carom schema`). Each
@@ -357,10 +363,18 @@ class Simulation:
             sim.run(time=100)
             print(sim.averages["rdf"]["g"].max(), len(sim.open().frames))
         """
-        given = {"directory": os.path.abspath(os.fspath(directory)), "thermo_interval": thermo_interval} | keys
-        refuse_masked("output", given)
-        self._output = [f"output.{key}={toml_value(value)}" for key, value in given.items()], float(thermo_interval)
-        self._session.set_output(*self._output)
+        given = {"directory": directory, "thermo_interval": thermo_interval} | keys
+        output = self._deck_output | {key: value for key, value in given.items() if value is not None}
+        if "directory" not in output:
+            raise UsageError("output: there is no 'directory'; give one, since there is no deck that does")
+        refuse_masked("output", output)
+        self._output = output | {"directory": os.path.abspath(os.fspath(output["directory"]))}
+        self._every = thermo_interval is None and "thermo_interval" in output  # a deck's, which run(every=…) replaces
+        self._set_output(self._session)
+
+    def _set_output(self, session):
+        session.set_output([f"output.{key}={toml_value(value)}" for key, value in self._output.items()],
+                           float(self._output.get("thermo_interval", 0)))
 
     @property
     def directory(self):
@@ -404,6 +418,7 @@ class Simulation:
         of the deck.
 
         time [time], steps, collisions: the run ends at the first of them that it reaches.
+        every: instead of the thermo_interval of a deck; that of output() must be the same.
         callback(simulation) is called at intervals of `every` units of simulated time, and at the start and the end; it may set
         velocities. An exception in it ends the run at the end of the step (in free flight: after 500 000 collisions, or at the end of
         the epoch) and is passed on. So does Ctrl-C, as KeyboardInterrupt; the simulation can be used and continued afterwards.
@@ -420,18 +435,21 @@ class Simulation:
         if self._cores and self._session.method == "verlet":
             raise UsageError("run: verlet treats particles as points and would ignore 'radius'; take psa or edda, where spheres collide, "
                              "or leave radius out")
+        if self._output and self._every and every not in (None, self._session.interval) and not self._session.begun:
+            self._output["thermo_interval"] = every
+            self._set_output(self._session)
         try:
             self._session.run(ends, callback and (lambda: callback(self)), line,
-                              lambda: toml_text(deck_of(self, "run", {"steps": 1})))
+                              lambda whole: toml_text(deck_of(self, "run", {"steps": 1}, whole)), script_name())
         finally:
             if line:
                 line.close()
             self._warn(self._session.warnings)
 
-    def write_deck(self, file, time=None, steps=None, every=None):
-        """Writes a deck for `carom run` and from_deck() with the present state (without images), the forces, the integrator and this
-        end; `every` is the time between frames, and between rows of thermo.csv."""
-        write_deck(self, file, {"end_time": time, "steps": steps}, every or 0)
+    def write_deck(self, file, time=None, steps=None, every=None, collisions=None):
+        """Writes a deck for `carom run` and from_deck() with the present state (without images), the forces, the integrator, the keys
+        of output() and this end; `every` is the time between frames, and between rows of thermo.csv."""
+        write_deck(self, file, {"end_time": time, "steps": steps, "collisions": collisions}, every)
 
     @property
     def position(self):

@@ -10,7 +10,7 @@
 #include "io/files/output_directory.h"
 #include "sample_run.h"
 
-namespace carom {
+namespace carom::checkpoint_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -119,4 +119,4 @@ TEST(Checkpoint, TheOneBeforeIsTakenWhereTheLastIsDamaged) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::checkpoint_test

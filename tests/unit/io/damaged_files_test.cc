@@ -14,7 +14,7 @@
 #include "io/view/run_source.h"
 #include "sample_run.h"
 
-namespace carom {
+namespace carom::damaged_files_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -155,4 +155,4 @@ TEST(DamagedFiles, WhatIsNoTrajectoryIsRefusedInOneWay) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::damaged_files_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace carom {
+namespace carom::deck_problems_test {
 namespace {
 
 TEST(Nearest, FindsSlipsOfTheFingers) {
@@ -42,4 +42,4 @@ TEST(Problems, WarningsAreNoErrors) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::deck_problems_test

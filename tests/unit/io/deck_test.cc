@@ -14,7 +14,7 @@
 #include "io/deck/validate_state.h"
 #include "tests/support/thread_ranks.h"
 
-namespace carom {
+namespace carom::deck_test {
 namespace {
 
 /// A folder with decks for each test.
@@ -556,4 +556,4 @@ TEST_F(DeckTest, MemoryIsThatOfAllRanksWithinTheLimitOfTheProcess) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::deck_test

@@ -4,7 +4,7 @@
 #include "io/files/hdf5.h"
 #include "sample_run.h"
 
-namespace carom {
+namespace carom::events_test {
 namespace {
 
 Contact<2> contact(double time, Id lo, Id hi) {
@@ -104,4 +104,4 @@ TEST(Events, SlabsGoOnFromTheMark) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::events_test

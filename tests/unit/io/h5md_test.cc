@@ -10,7 +10,7 @@
 #include "io/files/trajectory_reader.h"
 #include "sample_run.h"
 
-namespace carom {
+namespace carom::h5md_test {
 namespace {
 
 using test::fresh_directory;
@@ -247,4 +247,4 @@ TEST(Hdf5File, AnArrayOfManyPiecesIsReadAsWritten) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::h5md_test

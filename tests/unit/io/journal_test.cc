@@ -17,7 +17,7 @@
 #include "io/files/journal_blocks.h"
 #include "sample_run.h"
 
-namespace carom {
+namespace carom::journal_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -329,4 +329,4 @@ TEST(Journal, NoFileIsWrittenToAPipe) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::journal_test

@@ -13,7 +13,7 @@
 #include "sample_run.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::marks_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -223,4 +223,4 @@ TEST(MarksOfFiles, FilesThatAreNotThoseOfTheRunAreErrors) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::marks_test

@@ -7,7 +7,7 @@
 #include "engine/base/error.h"
 #include "parallel/world.h"
 
-namespace carom {
+namespace carom::one_rank_test {
 
 TEST(OneRank, RunsTheWork) {
   const World ranks;
@@ -34,4 +34,4 @@ TEST(OneRank, OneOfSeveralProcessesIsAnError) {
   }
 }
 
-}  // namespace carom
+}  // namespace carom::one_rank_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace carom {
+namespace carom::options_test {
 namespace {
 
 TEST(WallSeconds, ReadsHoursMinutesSeconds) {
@@ -20,4 +20,4 @@ TEST(WallSeconds, RefusesEverythingElse) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::options_test

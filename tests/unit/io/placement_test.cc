@@ -9,7 +9,7 @@
 
 #include "engine/base/random.h"
 
-namespace carom {
+namespace carom::placement_test {
 namespace {
 
 template <int D>
@@ -248,4 +248,4 @@ TEST(PackingFraction, IsVolumeOfSpheresOverVolume) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::placement_test

@@ -9,7 +9,7 @@
 #include <csignal>
 #include <thread>
 
-namespace carom {
+namespace carom::requests_test {
 namespace {
 
 TEST(Requests, ASignalAsksForOneCheckpoint) {
@@ -66,4 +66,4 @@ TEST(Requests, ASignalThatIsIgnoredStaysIgnored) {  // as under nohup
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::requests_test

@@ -9,7 +9,7 @@
 #include "engine/laws/interaction.h"
 #include "engine/run/observable.h"
 
-namespace carom {
+namespace carom::schema_test {
 namespace {
 
 TEST(Schema, KnowsEveryDeclaredParameter) {
@@ -59,4 +59,4 @@ TEST(Schema, EveryKeyOfItsOwnHasAMeaningOrAUnit) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::schema_test

@@ -26,7 +26,7 @@
 #include "io/files/thermo.h"
 #include "sample_run.h"
 
-namespace carom {
+namespace carom::text_outputs_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -496,4 +496,4 @@ TEST(Progress, ClockText) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::text_outputs_test

@@ -14,7 +14,7 @@
 #include "engine/forces/potentials/yukawa.h"
 #include "tests/unit/potentials/accuracy.h"
 
-namespace carom {
+namespace carom::cut_test {
 namespace {
 
 using test::expect_within;
@@ -267,4 +267,4 @@ TEST(TailCorrection, OfTruncatedLennardJonesIsTheTextbooks) {  // Allen, Tildesl
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::cut_test

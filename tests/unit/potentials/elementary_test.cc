@@ -13,7 +13,7 @@
 
 #include "tests/unit/potentials/precise.h"
 
-namespace carom {
+namespace carom::elementary_test {
 namespace {
 
 using test::error_in_ulps;
@@ -145,4 +145,4 @@ TEST(Elementary, SpecialCases) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::elementary_test

@@ -14,7 +14,7 @@
 #include "tests/unit/potentials/precise.h"
 #include "tests/unit/potentials/scene.h"
 
-namespace carom {
+namespace carom::ewald_test {
 namespace {
 
 using namespace std::string_literals;
@@ -546,4 +546,4 @@ TEST(Ewald, RefusesWhatItCannotDo) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::ewald_test

@@ -13,7 +13,7 @@
 #include "engine/forces/simd/pair_kernels.h"
 #include "tests/unit/potentials/random_laws.h"
 
-namespace carom {
+namespace carom::pair_fuzz_test {
 namespace {
 
 using test::Dice;
@@ -295,4 +295,4 @@ TEST(PairFuzzSlow, SumsAreThoseOfPlainLoopsOrTheErrorNamesThePair) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::pair_fuzz_test

@@ -5,7 +5,7 @@
 #include "engine/forces/potentials/inverse_distance.h"
 #include "tests/unit/potentials/plain_sums.h"
 
-namespace carom {
+namespace carom::pair_limits_test {
 namespace {
 
 using test::cut_lennard_jones;
@@ -121,4 +121,4 @@ TEST(ForceSums, DoNotWrapWhereManyTermsHaveManyPartners) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::pair_limits_test

@@ -16,13 +16,13 @@
 #include "tests/unit/potentials/cases.h"
 #include "tests/unit/potentials/plain_sums.h"
 
-namespace carom {
+namespace carom::pair_sums_test {
 namespace {
 
 using namespace std::string_literals;
 using test::cut_lennard_jones;
 using test::expect_reference;
-using test::Given;
+using test::Options;
 using test::kQuantum;
 using test::Outcome;
 using test::outcome;
@@ -250,7 +250,7 @@ TEST(PairSums, OfAPotentialThatIsNotListedAreTheSame) {
   Scene<3> scene(200, 6, Boundary::periodic, 0.4);
   const auto x_new = test::displaced(scene.particles.x, scene.random_vectors(0.1), 1);
   for (const char* cut : {"switch", "shifted", "force-shifted"}) {
-    const Given given = {{"amplitude", 2.0}, {"kappa", 1.1}, {"charges", true}, {"cutoff", 2.0}, {"cut", cut + ""s}};
+    const Options given = {{"amplitude", 2.0}, {"kappa", 1.1}, {"charges", true}, {"cutoff", 2.0}, {"cut", cut + ""s}};
     Parameters parameters;
     for (const auto& [name, value] : given) parameters.set(name, value);
     const auto own = options::pair_term<3>(
@@ -271,7 +271,7 @@ TEST(PairSums, DoNotDependOnTheOrderOfTheParticles) {
   reverse(turned.particles.x);
   reverse(turned.particles.charge);
   reverse(turned.particles.species);
-  const Given given = {{"constant", 1.3},
+  const Options given = {{"constant", 1.3},
                        {"form", "damped-shifted"s},
                        {"damping", 0.9},
                        {"cutoff", 2.4},
@@ -323,4 +323,4 @@ TEST(PairSums, AreBroughtUpToDateExactly) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::pair_sums_test

@@ -7,7 +7,7 @@
 #include "engine/forces/potentials/lennard_jones.h"
 #include "tests/unit/potentials/scene.h"
 
-namespace carom {
+namespace carom::pairs_test {
 namespace {
 
 using namespace std::string_literals;
@@ -362,4 +362,4 @@ TEST(Pairs, ScaleKnowsTheLargestWeights) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::pairs_test

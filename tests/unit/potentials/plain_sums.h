@@ -105,9 +105,9 @@ void expect_reference(const Scene<D>& scene, const Interaction<D>& term, const P
   EXPECT_NEAR(result.sums[0], energy, expected.own_size > 0 ? 1e-15 * (expected.own_size + std::abs(energy)) : 0);
 }
 
-using Given = std::vector<std::pair<std::string, ParameterValue>>;
+using Options = std::vector<std::pair<std::string, ParameterValue>>;
 
-inline Given cut_lennard_jones(double sigma, double cutoff) {
+inline Options cut_lennard_jones(double sigma, double cutoff) {
   return {{"epsilon", 1.0}, {"sigma", sigma}, {"cutoff", cutoff}, {"cut", std::string("shifted")}};
 }
 

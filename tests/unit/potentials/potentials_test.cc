@@ -14,7 +14,7 @@
 #include "engine/forces/potentials/yukawa.h"
 #include "tests/unit/potentials/accuracy.h"
 
-namespace carom {
+namespace carom::potentials_test {
 namespace {
 
 using test::expect_within;
@@ -177,4 +177,4 @@ TEST(Accuracy, InversePower) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::potentials_test

@@ -7,7 +7,7 @@
 #include "engine/forces/potentials/lennard_jones.h"
 #include "tests/unit/potentials/accuracy.h"
 
-namespace carom {
+namespace carom::table_test {
 namespace {
 
 using test::Precise;
@@ -197,4 +197,4 @@ TEST(Table, ItsEndIsCutLikeThatOfOtherPotentials) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::table_test

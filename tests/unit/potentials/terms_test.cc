@@ -7,7 +7,7 @@
 
 #include "tests/unit/potentials/cases.h"
 
-namespace carom {
+namespace carom::terms_test {
 namespace {
 
 using test::displaced;
@@ -287,4 +287,4 @@ TYPED_TEST(InDimension, OnlyTheUniformFieldAcceleratesEverybodyAlike) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::terms_test

@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-namespace carom {
+namespace carom::exact_sum_test {
 namespace {
 
 using Wide = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<2400>>;
@@ -125,4 +125,4 @@ TEST(ExactSum, IsNotANumberWhenATermIsNot) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::exact_sum_test

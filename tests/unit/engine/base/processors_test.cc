@@ -15,7 +15,7 @@
 #include "tests/support/experiments.h"
 #include "tests/unit/potentials/cases.h"
 
-namespace carom {
+namespace carom::processors_test {
 namespace {
 
 struct Hash {
@@ -232,4 +232,4 @@ TEST(Processors, LoseAndGainTheSameEnergy) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::processors_test

@@ -8,7 +8,7 @@
 
 #include "tests/unit/potentials/precise.h"
 
-namespace carom {
+namespace carom::random_test {
 namespace {
 
 using Block = std::array<std::uint32_t, 4>;
@@ -94,4 +94,4 @@ TEST(RandomStream, UniformNumbersStayInsideTheOpenInterval) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::random_test

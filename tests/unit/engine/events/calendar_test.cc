@@ -5,7 +5,7 @@
 
 #include <random>
 
-namespace carom {
+namespace carom::calendar_test {
 namespace {
 
 const auto always = [](const CalendarEntry&) { return true; };
@@ -103,4 +103,4 @@ TEST(Calendar, StartsAfresh) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::calendar_test

@@ -8,7 +8,7 @@
 
 #include "engine/events/meeting.h"
 
-namespace carom {
+namespace carom::contact_test {
 namespace {
 
 using Precise = boost::multiprecision::cpp_bin_float_50;
@@ -279,4 +279,4 @@ TEST(Polynomial, FindsTheFirstFallAmongClusteredRoots) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::contact_test

@@ -12,7 +12,7 @@
 #include "engine/forces/forces.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::event_core_test {
 namespace {
 
 struct Hit {
@@ -402,4 +402,4 @@ TEST(EventCore, CountsWhatItDid) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::event_core_test

@@ -6,7 +6,7 @@
 #include "engine/events/contact.h"
 #include "tests/unit/engine/events/event_cases.h"
 
-namespace carom {
+namespace carom::event_queue_test {
 namespace {
 
 /// Spheres of diameter 1 with the given positions, all at rest, in slots that are their ids.
@@ -126,4 +126,4 @@ TEST(EventQueue, LeavesOutWhatASphereNoLongerPlans) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::event_queue_test

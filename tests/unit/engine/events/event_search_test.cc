@@ -6,7 +6,7 @@
 #include "engine/events/contact.h"
 #include "tests/unit/engine/events/event_cases.h"
 
-namespace carom {
+namespace carom::event_search_test {
 namespace {
 
 /// An EventSearch without an EventCore.
@@ -239,4 +239,4 @@ TEST(EventSearch, FindsAllThatASphereMayTouchInAWindow) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::event_search_test

@@ -12,7 +12,7 @@
 #include "tests/support/thread_ranks.h"
 #include "tests/unit/engine/events/event_cases.h"
 
-namespace carom {
+namespace carom::rough_contact_test {
 namespace {
 
 using test::set_law;
@@ -247,4 +247,4 @@ TEST(RoughContacts, MistakesAreErrorsWithARemedy) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::rough_contact_test

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace carom {
+namespace carom::extrapolation_test {
 namespace {
 
 using integrator::Extrapolation;
@@ -73,4 +73,4 @@ TEST(Extrapolation, FromASlabThatIsMuchShorterOnlyItsOwnIsTaken) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::extrapolation_test

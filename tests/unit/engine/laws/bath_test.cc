@@ -12,7 +12,7 @@
 #include "engine/run/baths.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::bath_test {
 namespace {
 
 /// The sums over what an observer sees, and the standard error of the mean from blocks.
@@ -311,4 +311,4 @@ TEST(Baths, MistakesAreRefused) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::bath_test

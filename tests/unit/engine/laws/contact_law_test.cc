@@ -9,7 +9,7 @@
 #include "engine/events/meeting.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::contact_law_test {
 namespace {
 
 using test::set_law;
@@ -176,4 +176,4 @@ TEST(DissipativeContacts, CollapseOfThreeBodiesEnds) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::contact_law_test

@@ -10,7 +10,7 @@
 #include "engine/forces/add_interaction.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::fixed_test {
 namespace {
 
 const std::vector<std::string> kMethods = {"free-flight", "psa", "cva", "mcva", "cdda", "edda"};
@@ -267,4 +267,4 @@ TEST(OneWayWall, WhatCannotBeIsRefused) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::fixed_test

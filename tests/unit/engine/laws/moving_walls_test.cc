@@ -11,7 +11,7 @@
 #include "engine/forces/add_interaction.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::moving_walls_test {
 namespace {
 
 const std::vector<std::string> kMethods = {"free-flight", "psa", "cva", "mcva", "cdda", "edda"};
@@ -252,4 +252,4 @@ TEST(Walls, NeedRoomBetweenThem) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::moving_walls_test

@@ -11,7 +11,7 @@
 #include "tests/support/experiments.h"
 #include "tests/support/thread_ranks.h"
 
-namespace carom {
+namespace carom::piston_test {
 namespace {
 
 constexpr double kRadius = 0.5, kMass = 2;
@@ -208,4 +208,4 @@ TEST(Walls, AreRefusedWhereTheyMeanNothing) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::piston_test

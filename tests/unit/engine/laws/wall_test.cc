@@ -9,7 +9,7 @@
 #include "engine/laws/box.h"
 #include "engine/laws/counters.h"
 
-namespace carom {
+namespace carom::wall_test {
 namespace {
 
 constexpr Boundary W = Boundary::wall, P = Boundary::periodic, O = Boundary::open;
@@ -101,4 +101,4 @@ TEST(Walls, EachIsThereOnce) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::wall_test

@@ -14,7 +14,7 @@
 #include "tests/support/same_statistics.h"
 #include "tests/support/thread_ranks.h"
 
-namespace carom {
+namespace carom::decomposition_test {
 namespace {
 
 using test::Given;
@@ -631,4 +631,4 @@ TEST(Decomposition, StiffForces) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::decomposition_test

@@ -11,7 +11,7 @@
 #include "engine/ranks/bisection.h"
 #include "tests/support/thread_ranks.h"
 
-namespace carom {
+namespace carom::halo_exchange_test {
 namespace {
 
 constexpr double kNear = 1.0, kFar = 1.8;
@@ -155,4 +155,4 @@ TEST(HaloExchange, KnowsHowFarOwnParticlesHaveCome) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::halo_exchange_test

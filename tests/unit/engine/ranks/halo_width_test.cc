@@ -8,7 +8,7 @@
 #include <cmath>
 #include <limits>
 
-namespace carom {
+namespace carom::halo_width_test {
 namespace {
 
 constexpr double kReach = 2.5, kPath = 0.01, kDiameter = 1;
@@ -82,4 +82,4 @@ TEST(HaloWidth, IsOutdatedBeforeAParticleHasComeTooFar) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::halo_width_test

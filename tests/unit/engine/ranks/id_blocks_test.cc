@@ -10,7 +10,7 @@
 #include "tests/support/thread_ranks.h"
 #include "tests/unit/engine/events/event_cases.h"
 
-namespace carom {
+namespace carom::id_blocks_test {
 namespace {
 
 /// Everything that a run reports.
@@ -197,4 +197,4 @@ TEST(Bisection, GivesEachTheSameWork) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::id_blocks_test

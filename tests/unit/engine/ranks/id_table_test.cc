@@ -8,7 +8,7 @@
 #include <map>
 #include <random>
 
-namespace carom {
+namespace carom::id_table_test {
 namespace {
 
 TEST(IdTable, DoesWhatAMapDoes) {
@@ -32,4 +32,4 @@ TEST(IdTable, DoesWhatAMapDoes) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::id_table_test

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace carom {
+namespace carom::migration_test {
 namespace {
 
 /// The particles of a rank, with a field in addition to those of a system.
@@ -71,4 +71,4 @@ TEST(Migration, NeedsNoIdsWhereAllAreKnown) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::migration_test

@@ -5,7 +5,7 @@
 
 #include "tests/unit/engine/ranks/window_cases.h"
 
-namespace carom {
+namespace carom::subdomain_exchange_test {
 namespace {
 
 constexpr double kEnd = 0.12;
@@ -65,4 +65,4 @@ TEST(Subdomain, HasTheContactsOfOneCore) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::subdomain_exchange_test

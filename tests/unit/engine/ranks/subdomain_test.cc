@@ -6,7 +6,7 @@
 #include "engine/ranks/communicator.h"
 #include "tests/unit/engine/events/event_cases.h"
 
-namespace carom {
+namespace carom::subdomain_test {
 namespace {
 
 constexpr double kEnd = 0.12, kDisplacement = 0.5;  // of a window
@@ -310,4 +310,4 @@ TEST(WindowRepair, FindsAContactOfTwoPathsThatEachSubdomainLearnsFromTheOther) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::subdomain_test

@@ -8,7 +8,7 @@
 
 #include "tests/unit/engine/ranks/window_cases.h"
 
-namespace carom {
+namespace carom::window_length_test {
 namespace {
 
 /// Calls visit(length) for each window up to `end`.
@@ -91,4 +91,4 @@ TEST(WindowLength, FindsWhetherASphereMayHaveComeTooFar) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::window_length_test

@@ -10,7 +10,7 @@
 #include "tests/support/thread_ranks.h"
 #include "tests/unit/engine/events/event_cases.h"
 
-namespace carom {
+namespace carom::windowed_flight_test {
 namespace {
 
 /// A division of a run.
@@ -381,4 +381,4 @@ TEST(WindowedFlight, GhostsFromAsFarAsTwoSpheresCanCome) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::windowed_flight_test

@@ -8,7 +8,7 @@
 
 #include "engine/base/random.h"
 
-namespace carom {
+namespace carom::blocking_test {
 namespace {
 
 /// Of mean 0 and variance 1: the sum of three uniform deviates.
@@ -183,4 +183,4 @@ TEST(Blocking, ContinuesFromAnArchive) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::blocking_test

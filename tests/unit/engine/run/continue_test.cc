@@ -13,7 +13,7 @@
 #include "tests/support/same_statistics.h"
 #include "tests/support/thread_ranks.h"
 
-namespace carom {
+namespace carom::continue_test {
 namespace {
 
 using test::Given;
@@ -464,4 +464,4 @@ TEST(Continue, ALaterEnd) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::continue_test

@@ -10,7 +10,7 @@
 #include "engine/setup/placement.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::hard_cases_test {
 namespace {
 
 struct Method {
@@ -180,4 +180,4 @@ INSTANTIATE_TEST_SUITE_P(Methods, HardCases, testing::ValuesIn(kMethods),
                          [](const auto& test) { return test.param.label; });
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::hard_cases_test

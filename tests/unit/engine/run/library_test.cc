@@ -4,7 +4,7 @@
 #include <carom/carom.h>
 #include <gtest/gtest.h>
 
-namespace carom {
+namespace carom::library_test {
 namespace {
 
 std::unique_ptr<System<2>> two_discs() {
@@ -124,4 +124,4 @@ TEST(Library, EveryDefaultCanBeRead) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::library_test

@@ -9,7 +9,7 @@
 #include "engine/base/random.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::mean_squared_displacement_test {
 namespace {
 
 std::unique_ptr<System<2>> two_species(std::size_t n) {
@@ -98,4 +98,4 @@ TEST(MeanSquaredDisplacement, OfStraightFlights) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::mean_squared_displacement_test

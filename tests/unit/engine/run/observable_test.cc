@@ -12,7 +12,7 @@
 #include "engine/base/random.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::observable_test {
 namespace {
 
 template <int D>
@@ -199,4 +199,4 @@ TEST(Profile, OfAUniformFluidIsFlat) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::observable_test

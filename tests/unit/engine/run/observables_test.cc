@@ -7,7 +7,7 @@
 
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::observables_test {
 namespace {
 
 template <int D>
@@ -91,4 +91,4 @@ TEST(Observables, LongRangeCorrectionsAreAddedToWhatIsShownAndToNothingElse) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::observables_test

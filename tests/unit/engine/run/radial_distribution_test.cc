@@ -10,7 +10,7 @@
 #include "engine/base/random.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::radial_distribution_test {
 namespace {
 
 /// Points at random positions; two species with 2/3 and 1/3 of them.
@@ -211,4 +211,4 @@ TEST(RadialDistribution, RefusesWhatHasNoMeaning) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::radial_distribution_test

@@ -5,7 +5,7 @@
 
 #include "engine/run/simulation.h"
 
-namespace carom {
+namespace carom::run_clock_test {
 namespace {
 
 /// A clock with a plan that runs without particles.
@@ -106,4 +106,4 @@ TEST(RunClock, TheNearestEndSaysHowMuchIsDone) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::run_clock_test

@@ -11,7 +11,7 @@
 #include "engine/run/radial_distribution.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::simulation_test {
 namespace {
 
 /// Records what was reported at which time.
@@ -526,4 +526,4 @@ TEST(Simulation, FreeFlightRefusesForces) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::simulation_test

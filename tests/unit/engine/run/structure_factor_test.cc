@@ -12,7 +12,7 @@
 #include "engine/run/observable.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::structure_factor_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -149,4 +149,4 @@ TEST(StructureFactor, RefusesABoxWithoutWaves) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::structure_factor_test

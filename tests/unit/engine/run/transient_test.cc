@@ -7,7 +7,7 @@
 
 #include "engine/base/random.h"
 
-namespace carom {
+namespace carom::transient_test {
 namespace {
 
 double deviate(RandomStream& random) { return 2 * (random.uniform() + random.uniform() + random.uniform() - 1.5); }
@@ -104,4 +104,4 @@ TEST(Transient, TheLongestCountsAndAnArchiveContinues) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::transient_test

@@ -11,7 +11,7 @@
 #include "engine/run/observable.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::transport_test {
 namespace {
 
 template <int D>
@@ -296,4 +296,4 @@ TEST(Transport, RefusesWhatHasNoCoefficients) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::transport_test

@@ -11,7 +11,7 @@
 
 #include "engine/base/error.h"
 
-namespace carom {
+namespace carom::neighbour_list_test {
 namespace {
 
 /// Every pair and image within reach, by brute force.
@@ -166,4 +166,4 @@ TEST(NeighbourList, CoversParticlesOfVeryDifferentSizes) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::neighbour_list_test

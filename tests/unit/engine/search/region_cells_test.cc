@@ -8,7 +8,7 @@
 #include <random>
 #include <set>
 
-namespace carom {
+namespace carom::region_cells_test {
 namespace {
 
 constexpr double kReach = 1.2;
@@ -142,4 +142,4 @@ TEST(CellGrid, StoresFewerRowsOrAllOfThemInOrder) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::region_cells_test

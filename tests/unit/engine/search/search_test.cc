@@ -11,7 +11,7 @@
 #include "engine/search/simd/scan_kernel.h"
 #include "tests/unit/engine/events/event_cases.h"
 
-namespace carom {
+namespace carom::search_test {
 namespace {
 
 /// Sets an environment variable during its lifetime.
@@ -441,4 +441,4 @@ TEST(Scan, FindsTheFirstOfMoreThanABlockOfCandidates) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::search_test

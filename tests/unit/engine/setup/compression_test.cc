@@ -8,7 +8,7 @@
 
 #include "engine/setup/placement.h"
 
-namespace carom {
+namespace carom::compression_test {
 namespace {
 
 constexpr Boundary W = Boundary::wall, P = Boundary::periodic;
@@ -152,4 +152,4 @@ TEST(Compression, ABoxThatIsTooNarrowHasNoRoom) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::compression_test

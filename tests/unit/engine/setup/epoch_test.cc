@@ -9,7 +9,7 @@
 
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::epoch_test {
 namespace {
 
 TEST(Epoch, IsFortyMeanFreeTimesInAnyDimension) {
@@ -99,4 +99,4 @@ TEST(Epoch, EndsBeforeAParticleHasComeThroughTooManyBoxes) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::epoch_test

@@ -8,7 +8,7 @@
 #include "tests/support/experiments.h"
 #include "tests/support/thread_ranks.h"
 
-namespace carom {
+namespace carom::initial_state_test {
 namespace {
 
 /// Discs between walls along axis 1, some of which reach through a wall or overlap, in every block of ids.
@@ -51,4 +51,4 @@ TEST(InitialState, OutsidersAndOverlapsAreThoseOfOneRank) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::initial_state_test

@@ -11,7 +11,7 @@
 #include "engine/events/meeting.h"
 #include "tests/support/experiments.h"
 
-namespace carom {
+namespace carom::contact_scan_test {
 namespace {
 
 /// Scans a system at rest in a slab of length 1 with the accelerations a.
@@ -343,4 +343,4 @@ TEST(ContactScan, LimitsTheEventsOfASlab) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::contact_scan_test

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace carom {
+namespace carom::path_hash_test {
 namespace {
 
 Particles<3> particles_of(std::vector<Id> ids) {
@@ -67,4 +67,4 @@ TEST(PathHash, DependsOnEachPartOfTheKeyAndOnTheOrder) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::path_hash_test

@@ -13,7 +13,7 @@
 #include "tests/support/static_scenes.h"
 #include "tests/support/thread_ranks.h"
 
-namespace carom {
+namespace carom::rest_test {
 namespace {
 
 constexpr std::int64_t kSteps = 200;
@@ -248,4 +248,4 @@ INSTANTIATE_TEST_SUITE_P(Small, FewAtRest2, testing::ValuesIn(kFlat), kLabel);
 INSTANTIATE_TEST_SUITE_P(Small, FewAtRest3, testing::ValuesIn(kHeap), kLabel);
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::rest_test

@@ -13,7 +13,7 @@
 
 #include "engine/base/random.h"
 
-namespace carom {
+namespace carom::resting_test {
 namespace {
 
 template <int D>
@@ -440,4 +440,4 @@ TEST(KeepTangential, LeavesWhatIsTangentialToRounding) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::resting_test

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace carom {
+namespace carom::slab_watch_test {
 namespace {
 
 /// A state with fields of particles, a value that the run has registered, and two that the integrator has registered.
@@ -94,4 +94,4 @@ TEST(SlabWatch, IsLeftWhereTheRunIsToStop) {
 }
 
 }  // namespace
-}  // namespace carom
+}  // namespace carom::slab_watch_test
