@@ -181,7 +181,15 @@ double EventSearch<D>::distance_left(Slot i) const {
 
 template <int D>
 void EventSearch<D>::look_again(Slot i, double now) {
-  if (cells_) return cross(i, now);
+  if (cells_)
+    cross(i, now);
+  else
+    renew_list(i, now);
+}
+
+/// Renews the list of a sphere that is about to leave its region.
+template <int D>
+void EventSearch<D>::renew_list(Slot i, double now) {
   const NextEvent<D>& a = queue_[i];
   const auto way = [&](const Vec<D>& x) {  // distance from the centre of its list's region
     return (x - Eigen::Map<const Vec<D>>(a.where.centre)).norm();

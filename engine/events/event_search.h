@@ -88,6 +88,7 @@ class EventSearch {
   }
   [[gnu::noinline]] void offer_all(const ScanTask& task);  // seldom needed, and large
   [[gnu::noinline]] void cross(Slot i, double now);
+  [[gnu::noinline]] void renew_list(Slot i, double now);
   double distance_left(Slot i) const;
   /// Whether the skin leaves room for another `max_displacement` at the border.
   bool border_fits() const { return lists_ && lists_->skin() >= 3 * max_displacement_; }

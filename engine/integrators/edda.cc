@@ -33,26 +33,20 @@
 #include "engine/integrators/chebyshev.h"
 #include "engine/integrators/extrapolation.h"
 #include "engine/integrators/registry.h"
+#include "engine/integrators/sweep_control.h"
 #include "engine/stepping/slab_core.h"
 
 namespace carom::integrator {
 namespace {
 
-constexpr int kMostSweeps = 60;
 constexpr int kMostPieces = 1 << 17;         // of a step
 constexpr int kPiecesBeforeGrowth = 4;       // pieces that take few sweeps, before twice the length is tried
-constexpr int kFewSweeps = kMostSweeps / 3;  // two pieces of half the length would take hardly more in all
+constexpr int kFewSweeps = SweepControl::kMostSweeps / 3;  // two pieces of half the length would take hardly more in all
 constexpr std::uint64_t kPartialUpdate = 5;  // if fewer than one particle in 5 moved, only its pairs are evaluated
-constexpr int kSweepsBeforeFreezing = 6;     // sweeps before particles may be frozen
-constexpr int kSwapsBeforeFreezing = 3;      // swaps of partners after that, until a particle is frozen
-constexpr int kSweepsBeforeStiff = 4;        // sweeps after which slow contraction indicates stiffness
-constexpr double kStiffContraction = Chebyshev::kSmall * Chebyshev::kSmall;  // of two sweeps
-constexpr double kFrequencyMargin = 1.1;                                     // for frequencies above the estimate
-constexpr std::int64_t kSlabsPerFrequency = 1000;                            // slabs for which the estimate is used
-constexpr double kStalled = 0.1;     // contraction of kSweepsBeforeFreezing sweeps that counts as stalled
-constexpr int kMostStalled = 2;      // stalls before the slab is shortened
-constexpr double kTooStiff = 0.5;    // if such a contraction is expected, stiffness freezes no particle
-constexpr double kMostFolded = 0.1;  // of the kinetic energy
+constexpr int kSwapsBeforeFreezing = 3;      // swaps of partners once particles may be frozen, until one is
+constexpr double kFrequencyMargin = 1.1;     // for frequencies above the estimate
+constexpr std::int64_t kSlabsPerFrequency = 1000;  // slabs for which the estimate is used
+constexpr double kMostFolded = 0.1;                // of the kinetic energy
 // The rounding of positions changes the energy by this fraction of Σ |F| |x|, in any method.
 constexpr double kRoundingOfForces = 16 * std::numeric_limits<double>::epsilon();
 constexpr double kConverged = 0.5;              // of the tolerance: a particle with a smaller residual keeps its path
@@ -209,42 +203,36 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     std::ranges::fill(swaps_, 0);
     std::ranges::fill(move_, Vec<D>::Zero());
     any_freezes_ = false;
-    int times_stalled = 0;
     const double scale = std::max(scales_.speed, h * scales_.strength);
-    double wanted = resting() ? 0 : tolerance_ * scale;  // 0 means rounding; otherwise contacts at rest would open
-    std::array<double, kMostSweeps + 1> residual{};      // by sweep
-    for (int sweep = 1; sweep <= kMostSweeps; ++sweep) {
+    SweepControl control(resting() ? 0 : tolerance_ * scale);  // at rounding contacts at rest do not open
+    while (control.more()) {
       if (watch_) watch_->look();
-      sweeps_ = sweep;
       end_ = core_->fly(a_);
+      sweeps_ = control.sweep() + 1;
       if (!end_.complete) return false;
-      const auto [squared, swaps] = evaluate(system, h, sweep == 1);
-      const double largest = residual[sweep] = h * std::sqrt(squared);
+      const auto [squared, swaps] = evaluate(system, h, control.sweep() == 0);
+      const double largest = h * std::sqrt(squared);
       if (!std::isfinite(largest) || !held_) return false;
-      const double rounding = kForceRounding * (resting() ? std::max(scale, pressed_) : scale);
-      const bool converged = largest == 0 || (sweep > 2 && largest <= rounding && largest > 0.25 * residual[sweep - 1]);
-      if (converged || largest <= wanted) {
+      control.note(largest, kForceRounding * (resting() ? std::max(scale, pressed_) : scale));
+      if (control.good_enough()) {
         if (balance(system, h)) return true;
-        if (converged || any_freezes_) return false;
-        wanted = 0;
+        if (control.converged() || any_freezes_) return false;
+        control.want_rounding();
       }
-      if (sweep >= kSweepsBeforeFreezing && swaps > 0) freeze();
-      const double stalled = std::max(kStalled, 2 * elementary::pow(chebyshev.rate(), kSweepsBeforeFreezing));
-      if (sweep > kSweepsBeforeFreezing && sweep % kSweepsBeforeFreezing == 0 && stalled < kTooStiff &&
-          largest > stalled * residual[sweep - kSweepsBeforeFreezing]) {
-        if (++times_stalled > kMostStalled) return false;
+      if (control.may_freeze() && swaps > 0) freeze();
+      if (control.stalls(chebyshev.rate())) {
+        if (!control.may_stall_again()) return false;
         freeze_stalled(largest / h);
       }
-      const bool slow = sweep > kSweepsBeforeStiff && chebyshev.plain() &&
-                        largest > std::max(10 * wanted, kStiffContraction * residual[sweep - 2]);
-      if (slow && slab_ >= found_.measured + kSlabsPerFrequency) {
+      if (chebyshev.plain() && control.slow() && slab_ >= found_.measured + kSlabsPerFrequency) {
         found_.measured = slab_;
         found_.squared_frequency = kFrequencyMargin * largest_squared_frequency(system);
         chebyshev = Chebyshev(0.25 * h * h * found_.squared_frequency);
         ++counters_->fallbacks;
       }
       chebyshev.next();
-      const double small = kConverged * wanted / h, in_collision = kConvergedInCollision * wanted / h;
+      const double small = kConverged * control.wanted() / h,
+                   in_collision = kConvergedInCollision * control.wanted() / h;
       for (Id i = 0; i < n; ++i) {
         if (frozen(i)) continue;
         const Vec<D> e = mean_[i] - a_[i];
@@ -286,7 +274,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   void freeze_stalled(double largest) {
     any_freezes_ = true;
     for (Id i = 0; i < a_.size(); ++i)
-      if (core_->collides(i) && !frozen(i) && (mean_[i] - a_[i]).norm() >= kStalled * largest)
+      if (core_->collides(i) && !frozen(i) && (mean_[i] - a_[i]).norm() >= SweepControl::kStalled * largest)
         swaps_[i] = kSwapsBeforeFreezing + 1;
   }
 

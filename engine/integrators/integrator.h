@@ -23,7 +23,7 @@ struct Slab {
   std::int64_t index = 0;  ///< number of the step or epoch
   double start = 0;        ///< simulated time at its start
   double length = 0;       ///< > 0
-  std::int64_t steps = 1;  ///< in this length; more than one only in free flight
+  std::int64_t steps = 1;  ///< in this length; more than one in epochs of free flight, and with longest_step
   /// Free flight stops at this many pair collisions (counted by Counters::sphere_sphere from the start of the run).
   std::uint64_t collision_limit = std::numeric_limits<std::uint64_t>::max();
   /// Free flight stops at this many contacts in the slab, those with walls and the kicks of a bath included.

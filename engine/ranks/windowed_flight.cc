@@ -89,6 +89,21 @@ EventKey<D> WindowedFlight<D>::key_of_contact(std::uint64_t number, bool pairs) 
   return keys[number - 1];
 }
 
+/// The votes of all ranks as one. Collective.
+template <int D>
+typename WindowedFlight<D>::Vote WindowedFlight<D>::vote_of_all(const Vote& mine) {
+  std::array<double, 4> most = {mine.changed ? 1.0 : 0.0, mine.no_room ? 1.0 : 0.0, -mine.reached, mine.speed};
+  std::array<std::uint64_t, 3> sums = {mine.collisions_before, mine.events_before, mine.most_collisions};
+  ranks_.combine(most, sums);
+  return {.changed = most[0] > 0,
+          .no_room = most[1] > 0,
+          .reached = -most[2],
+          .speed = most[3],
+          .collisions_before = sums[0],
+          .events_before = sums[1],
+          .most_collisions = sums[2]};
+}
+
 template <int D>
 double WindowedFlight<D>::run(double end, const Report& report) {
   constexpr double kForever = std::numeric_limits<double>::infinity();
@@ -102,27 +117,26 @@ double WindowedFlight<D>::run(double end, const Report& report) {
     const auto left = static_cast<double>(report.collision_limit - collisions);
     double stop = std::min(length_.window_end(now_, end, left - length_.expected(length)), full);
     const double ran = subdomain_.run(now_, stop);
-    // Over all ranks: maxima of whether a path changed, a ghost found no room, of the time reached (negated) and of
-    // speeds; sums over the window before, and the most collisions of this one.
-    enum { changed, no_room, earliest, speed };
-    std::array<double, 4> most;
-    std::array<std::uint64_t, 3> sums;
+    Vote vote;
     bool valid = false;
-    const auto agree = [&](bool paths_changed) {
-      most = {paths_changed ? 1.0 : 0.0, room ? 0.0 : 1.0, -ran, subdomain_.fastest()};
-      sums = {got.sphere_sphere, got.contacts(), subdomain_.most_events()};
+    const std::uint64_t rounds = subdomain_.make_consistent([&](bool paths_changed) {
+      vote = vote_of_all({.changed = paths_changed,
+                          .no_room = !room,
+                          .reached = ran,
+                          .speed = subdomain_.fastest(),
+                          .collisions_before = got.sphere_sphere,
+                          .events_before = got.contacts(),
+                          .most_collisions = subdomain_.most_events()});
       got = {};
-      ranks_.combine(most, sums);
-      collisions += sums[0];
-      events_ += sums[1];
-      if (length > 0) length_.note(std::exchange(length, 0), sums[0]);
-      valid = most[no_room] == 0 && -most[earliest] == stop && !length_.too_fast(most[speed], stop - now_);
-      return valid && most[changed] > 0;
-    };
-    const std::uint64_t rounds = subdomain_.make_consistent(agree);
+      collisions += vote.collisions_before;
+      events_ += vote.events_before;
+      if (length > 0) length_.note(std::exchange(length, 0), vote.collisions_before);
+      valid = !vote.no_room && vote.reached == stop && !length_.too_fast(vote.speed, stop - now_);
+      return valid && vote.changed;
+    });
     if (events_ > report.max_events) throw_too_many_contacts(report.max_events);
-    length_.allow_for(most[speed]);
-    full = -most[earliest] < stop ? -most[earliest] : kForever;
+    length_.allow_for(vote.speed);
+    full = vote.reached < stop ? vote.reached : kForever;
     if (!valid) {  // revoke the window; if the log has no room for more, run it up to there
       if (!(full > now_)) throw_too_many_contacts(report.max_events);
       ++subdomain_.counts.cut;
@@ -136,7 +150,7 @@ double WindowedFlight<D>::run(double end, const Report& report) {
       throw Error(Failure::numerical, "internal error: subdomains do not agree about a window; please report this");
     got = subdomain_.paths().tally();
     const auto end_at = [&](std::uint64_t before, std::uint64_t limit, bool pairs) {
-      if (before + sums[2] < limit) return;  // else it may have been reached
+      if (before + vote.most_collisions < limit) return;  // else it may have been reached
       std::uint64_t count = pairs ? got.sphere_sphere : got.contacts();
       ranks_.sum({&count, 1});
       if (before + count < limit) return;

@@ -54,6 +54,14 @@ class WindowedFlight {
   template <class Spheres>
   void load(double now, Spheres&& spheres);
   EventKey<D> key_of_contact(std::uint64_t number, bool pairs);
+  /// What a rank knows after a round of a window, and what all ranks know together.
+  struct Vote {
+    bool changed = false, no_room = false;  ///< on any rank: a path, since the last vote; for a ghost
+    double reached = 0, speed = 0;          ///< the earliest time at which a log was full, or the end; the largest speed
+    std::uint64_t collisions_before = 0, events_before = 0;  ///< of the window before, in all
+    std::uint64_t most_collisions = 0;                       ///< an upper limit for this window, in all
+  };
+  Vote vote_of_all(const Vote& mine);
 
   const Box<D>& box_;
   Sizes sizes_;

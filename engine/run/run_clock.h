@@ -28,7 +28,7 @@ struct StepCount {
   std::uint64_t contacts = 0;  ///< of pairs twice
   /// Free flight with contacts that dissipate: an epoch is as many steps long as the gas is slower than at the start.
   double first_speed = 0;   ///< thermal speed at the start [length/time]
-  std::int64_t stride = 1;  ///< steps of the next epoch
+  std::int64_t stride = 1;  ///< steps of the next slab
 };
 
 class RunClock {

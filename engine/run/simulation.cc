@@ -105,22 +105,36 @@ void check_rates(const Box<D>& box, const Slab& slab, bool stepping) {
                       short_text(kMostOscillations / end) + ", or end the run earlier");
 }
 
-Plan checked(const Plan& plan) {
+void refuse_endless(const Plan& plan, const IntegratorInfo* info, bool ramp) {
+  if (const EndlessRun why = endless(plan, info, ramp); !why.what.empty())
+    throw Error(Failure::deck, why.what + "; " + why.remedy);
+}
+
+Plan checked(const Plan& plan, const IntegratorInfo& info, const Bath& bath) {
   if (!(plan.step > 0)) throw Error(Failure::deck, "the step must be positive");
   if (plan.longest_step != 0 && !(plan.longest_step >= plan.step))
     throw Error(Failure::deck, "longest_step is shorter than the step; give a longer one, or none");
-  if (!plan.steps && !plan.end_time && !plan.collisions)
-    throw Error(Failure::deck, "the plan has no end; give steps, end_time or collisions");
+  refuse_endless(plan, &info, bath.needs_ramp_time());
   for (const double interval : {plan.frame_interval, plan.thermo_interval}) check_interval(interval, plan.step);
   return plan;
 }
 }  // namespace
 
+EndlessRun endless(const Plan& plan, const IntegratorInfo* info, bool ramp) {
+  using enum EndlessRun::Cause;
+  if (plan.steps || plan.end_time) return {};
+  if (!plan.collisions) return {run, "the run has no end", "give steps, end_time or collisions"};
+  if (info != nullptr && !info->hard_cores)
+    return {collisions, "'" + std::string(info->name) + "' has no collisions, the run would never end",
+            "give steps or end_time"};
+  if (ramp)
+    return {bath, "the temperature of the bath is a ramp over a run without a last time",
+            "give run.steps or run.end_time, or the ramp_time of the bath, or one temperature"};
+  return {};
+}
+
 std::array<double, 2> ramp_times(const Plan& plan, std::int64_t start_step, double start_time) {
-  if (!plan.steps && !plan.end_time)
-    throw Error(Failure::deck,
-                "the temperature of the bath is a ramp over a run without a last time; give run.steps or "
-                "run.end_time, or the ramp_time of the bath, or one temperature");
+  refuse_endless(plan, nullptr, true);
   double end = plan.end_time.value_or(std::numeric_limits<double>::infinity());
   if (plan.steps) end = std::min(end, start_time + static_cast<double>(*plan.steps - start_step) * plan.step);
   return {start_time, end};
@@ -129,7 +143,7 @@ std::array<double, 2> ramp_times(const Plan& plan, std::int64_t start_step, doub
 template <int D>
 Simulation<D>::Simulation(std::unique_ptr<System<D>>&& system, const IntegratorInfo& info,
                           std::unique_ptr<Integrator<D>> integrator, Plan plan)
-    : plan_(checked(plan)), system_(std::move(system)), info_(info), integrator_(std::move(integrator)) {}
+    : plan_(checked(plan, info, system->box.bath)), system_(std::move(system)), info_(info), integrator_(std::move(integrator)) {}
 
 template <int D>
 typename Simulation<D>::Prepared Simulation<D>::prepare(const System<D>& system, const IntegratorInfo& info,

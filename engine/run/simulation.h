@@ -46,6 +46,15 @@ struct Plan {
   }
 };
 
+/// Why a run would never end, or a ramp of its bath, and what causes it. `what` is empty if nothing is wrong.
+struct EndlessRun {
+  enum class Cause { run, collisions, bath } cause = Cause::run;
+  std::string what, remedy;
+};
+
+/// Checks the ends of a plan. `info`: the method, null if it is unknown; `ramp`: the bath has a ramp without times.
+EndlessRun endless(const Plan& plan, const IntegratorInfo* info, bool ramp);
+
 /// The first and last time of a run that starts at this step and time: those of a ramp of the bath's temperature for
 /// which none are given. Throws Error(Failure::deck) if the plan has no last time.
 std::array<double, 2> ramp_times(const Plan& plan, std::int64_t start_step, double start_time);

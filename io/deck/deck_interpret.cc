@@ -443,20 +443,16 @@ class Interpreter {
     table->read<std::int64_t>("steps", deck_.plan.steps);
     table->read<double>("end_time", deck_.plan.end_time);
     table->read<std::int64_t>("collisions", deck_.plan.collisions);
-    if (!table->given("steps") && !table->given("end_time") && !table->given("collisions"))
-      problems_.error(table->at, "[run] has no end", "give steps, end_time or collisions");
-    const auto ramp = [](const TableConfig& bath) {
+    if (table->wrong) return;
+    const auto ramp = std::ranges::find_if(source_.baths, [](const TableConfig& bath) {
       return bath.parameters.find<std::vector<double>>("temperature") && !bath.parameters.has("ramp_time");
-    };
-    if (const auto at = std::ranges::find_if(source_.baths, ramp);
-        at != source_.baths.end() && table->given("collisions") && !table->given("steps") && !table->given("end_time"))
-      problems_.error(at->at, "the temperature is a ramp over a run without a last time",
-                      "give run.steps or run.end_time, or the ramp_time of the bath, or one temperature");
-    if (source_.integrator != nullptr && !source_.integrator->hard_cores && table->given("collisions") &&
-        !table->given("steps") && !table->given("end_time"))
-      problems_.error(table->place("collisions"),
-                      "'" + deck_.integrator + "' has no collisions, the run would never end",
-                      "give steps or end_time");
+    });
+    const EndlessRun why = endless(deck_.plan, source_.integrator, ramp != source_.baths.end());
+    if (why.what.empty()) return;
+    problems_.error(why.cause == EndlessRun::Cause::run          ? table->at
+                    : why.cause == EndlessRun::Cause::collisions ? table->place("collisions")
+                                                                 : ramp->at,
+                    why.what, why.remedy);
   }
 
   void output() {

@@ -193,7 +193,7 @@ DECK_ERRORS = {
     "bond to itself": (changed("[[0, 1]]", "[[1, 1]]"), 18, ["joins a particle to itself"]),
     "bond of three": (changed("[[0, 1]]", "[[0, 1, 1]]"), 18, ["'pairs' has the wrong type"]),
     "no bonds": (changed("pairs = [[0, 1]]\n", ""), 16, ["harmonic-bond: no bonds are given"]),
-    "run without end": (changed("steps = 10\n", ""), 26, ["[run] has no end", "end_time"]),
+    "run without end": (changed("steps = 10\n", ""), 26, ["the run has no end", "end_time"]),
     "negative end": (changed("steps = 10", "end_time = -1"), 27, ["'end_time' must be positive"]),
     "count without placement": (
         changed('[placement]\ntype = "fcc"\n', "", FLUID),

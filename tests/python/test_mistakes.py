@@ -41,6 +41,13 @@ def failed():
     sim.run(steps=200)
 
 
+def never_ending():
+    sim = carom.Simulation(box=[12, 6], boundary="periodic")
+    sim.add_particles(position=HERE)
+    sim.integrator("verlet", step=0.01)
+    sim.run(collisions=1)
+
+
 def without(what):
     sim = carom.Simulation(box=[12, 6])
     if what != "particles":
@@ -129,7 +136,7 @@ MISTAKES = {
     "class for a name": (USAGE, "the first argument is <class 'int'>; give a name", lambda: five_springs().integrator(int)),
     "forces in free flight": (USAGE, "free-flight knows no forces but a uniform-field",
                               lambda: [sim := five_springs(), sim.integrator("free-flight"), sim.run(time=1)]),
-    "no end": (USAGE, "the plan has no end; give ", lambda: five_springs().run()),
+    "no end": (USAGE, "the run has no end; give ", lambda: five_springs().run()),
     "negative time": (USAGE, "run: 'time' must be positive (is -1)", lambda: five_springs().run(time=-1)),
     "half a step": (USAGE, "run: 'steps' is a number; give a whole number", lambda: five_springs().run(steps=0.5)),
     "callback without an interval": (USAGE, "a callback needs 'every'", lambda: five_springs().run(time=1, callback=print)),
@@ -164,6 +171,7 @@ MISTAKES = {
         ROOT / "inputs/five-springs.toml", set={"integrator.steps": 0.1})),
     "directory that is not there": (carom.FileError, "nowhere: is not the directory of a run", lambda: carom.open("nowhere")),
     "directory of something else": (carom.FileError, "has no deck.toml", lambda: carom.open(ROOT)),
+    "end that never comes": (USAGE, "'verlet' has no collisions, the run would never end; give steps or end_time", never_ending),
     "deck without an end": (USAGE, "write_deck: the deck has no end", lambda: five_springs().write_deck("a.toml")),
     "deck in no folder": (carom.FileError, "cannot write the deck", lambda: five_springs().write_deck("no/where.toml", time=1)),
     "unknown name": (USAGE, "unknown name 'verlets'; give one of: ", lambda: carom.describe("verlets")),

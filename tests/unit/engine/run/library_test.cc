@@ -74,7 +74,7 @@ TEST(Library, MistakesAreErrorsWithARemedy) {
               "'step' must be positive (is -1); give a number above 0");
   expect_says(run_message(Failure::deck, none, "cdda", {{"step", 0.1}, {"order", 3}}), "'order' cannot be '3'");
   expect_says(run_message(Failure::deck, none, "mcva", {{"step", 0.1}, {"variant", "other"}}), "give one of: grid");
-  expect_says(run_message(Failure::deck, none, "psa", {{"step", 0.1}}, {}), "the plan has no end");
+  expect_says(run_message(Failure::deck, none, "psa", {{"step", 0.1}}, {}), "the run has no end");
   expect_says(run_message(Failure::initial_state, [](auto& s) { s.particles.mass.pop_back(); }),
               "'mass' of the particles has 1 entries, x has 2; give each particle one");
   expect_says(run_message(Failure::initial_state, [](auto& s) { s.particles.mass[1] = 0; }), "mass of particle 1");
