@@ -25,7 +25,6 @@
 #include <optional>
 #include <utility>
 
-#include "engine/base/elementary.h"
 #include "engine/base/error.h"
 #include "engine/events/meeting.h"
 #include "engine/forces/forces.h"
@@ -39,9 +38,9 @@
 namespace carom::integrator {
 namespace {
 
-constexpr int kMostPieces = 1 << 17;         // of a step
-constexpr int kPiecesBeforeGrowth = 4;       // pieces that take few sweeps, before twice the length is tried
-constexpr int kFewSweeps = SweepControl::kMostSweeps / 3;  // two pieces of half the length would take hardly more in all
+constexpr int kMostPieces = 1 << 17;    // of a step
+constexpr int kPiecesBeforeGrowth = 4;  // pieces that take few sweeps, before twice the length is tried
+constexpr int kFewSweeps = SweepControl::kMostSweeps / 3;  // two pieces of half the length would hardly take more
 constexpr std::uint64_t kPartialUpdate = 5;  // if fewer than one particle in 5 moved, only its pairs are evaluated
 constexpr int kSwapsBeforeFreezing = 3;      // swaps of partners once particles may be frozen, until one is
 constexpr double kFrequencyMargin = 1.1;     // for frequencies above the estimate
@@ -204,7 +203,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     std::ranges::fill(move_, Vec<D>::Zero());
     any_freezes_ = false;
     const double scale = std::max(scales_.speed, h * scales_.strength);
-    SweepControl control(resting() ? 0 : tolerance_ * scale);  // at rounding contacts at rest do not open
+    SweepControl control(resting() ? 0 : tolerance_ * scale);  // 0: rounding, else contacts at rest would open
     while (control.more()) {
       if (watch_) watch_->look();
       end_ = core_->fly(a_);

@@ -56,10 +56,13 @@ class WindowedFlight {
   EventKey<D> key_of_contact(std::uint64_t number, bool pairs);
   /// What a rank knows after a round of a window, and what all ranks know together.
   struct Vote {
-    bool changed = false, no_room = false;  ///< on any rank: a path, since the last vote; for a ghost
-    double reached = 0, speed = 0;          ///< the earliest time at which a log was full, or the end; the largest speed
-    std::uint64_t collisions_before = 0, events_before = 0;  ///< of the window before, in all
-    std::uint64_t most_collisions = 0;                       ///< an upper limit for this window, in all
+    bool changed = false;                 ///< a path has changed since the last vote
+    bool no_room = false;                 ///< there was no room for a ghost
+    double reached = 0;                   ///< the time at which the log was full, or the end of the window
+    double speed = 0;                     ///< the largest one of a sphere
+    std::uint64_t collisions_before = 0;  ///< number of pair collisions in the window before
+    std::uint64_t events_before = 0;      ///< number of contacts in the window before
+    std::uint64_t most_collisions = 0;    ///< an upper limit of the collisions in this window
   };
   Vote vote_of_all(const Vote& mine);
 

@@ -46,7 +46,7 @@ struct Plan {
   }
 };
 
-/// Why a run would never end, or a ramp of its bath, and what causes it. `what` is empty if nothing is wrong.
+/// Why a run, or a ramp of its bath, would never end. `what` is empty if it ends.
 struct EndlessRun {
   enum class Cause { run, collisions, bath } cause = Cause::run;
   std::string what, remedy;

@@ -443,7 +443,8 @@ class Interpreter {
     table->read<std::int64_t>("steps", deck_.plan.steps);
     table->read<double>("end_time", deck_.plan.end_time);
     table->read<std::int64_t>("collisions", deck_.plan.collisions);
-    if (table->wrong) return;
+    for (const char* key : {"steps", "end_time", "collisions"})
+      if (table->given(key) && !table->values.has(key)) return;  // a problem of its own
     const auto ramp = std::ranges::find_if(source_.baths, [](const TableConfig& bath) {
       return bath.parameters.find<std::vector<double>>("temperature") && !bath.parameters.has("ramp_time");
     });

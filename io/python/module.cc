@@ -387,7 +387,7 @@ py::dict descriptors() {
   return all;
 }
 
-/// Every key of a deck: {table: {variant: [keys]}}; keys of all variants are those of the variant "".
+/// Every key of a deck, described: {table: {variant: [key, …]}}. The variant "" has the keys that all variants have.
 py::dict schema() {
   py::dict all;
   for (const TableSchema& table : deck_schema()) {

@@ -82,6 +82,7 @@ Session<D>::Session(Deck& deck, const std::optional<GivenState>& given, const Pa
   terms_ = Terms<D>(deck, *system_);
   text_ = deck.toml_text;
   file_ = deck.file.string();
+  warned_ = true;
   const ValueTable& output = *deck.source->values.find("output");
   for (const auto& [key, place] : output.places)
     if (const auto value = output.values.all().find(key); value != output.values.all().end())
@@ -112,6 +113,7 @@ template <int D>
 void Session<D>::add_particles(const Columns& columns) {
   if (columns.inertia != 0) check_inertia(columns.inertia, D);
   change("add particles");
+  warned_ = false;
   Particles<D>& all = system_->particles;
   const std::size_t before = size_, added = columns.x.size() / D, kinds = species_.size();
   const auto at = std::ranges::find(species_, columns.species);
@@ -167,6 +169,7 @@ void Session<D>::add_particles(const Columns& columns) {
 template <int D>
 void Session<D>::set_position(std::span<const double> x) {
   set(&Particles<D>::x, x, "positions");
+  warned_ = false;
   std::ranges::fill(system_->particles.image, Image<D>{});
   system_->wrap(Failure::initial_state);
 }
@@ -257,6 +260,7 @@ void Session<D>::add_wall(Parameters given) {
   box.options.clear();
   for (const Parameters& each : all) carom::add_wall(box, each);
   change("add walls");
+  warned_ = false;
   system_->box = box_ = box;
   walls_ = std::move(all);
   set_contacts(contacts_);
@@ -302,6 +306,7 @@ void Session<D>::add_force(std::string_view type, Parameters given) {
   Parameters complete = completed(info.name, info.parameters, std::move(given));
   if (size_ == 0) refuse(std::string(type) + ": there are no particles yet; call add_particles() first");
   change("add forces");
+  warned_ = false;
   terms_.add(info, std::move(complete), *system_);
 }
 
@@ -310,6 +315,7 @@ void Session<D>::set_integrator(std::string_view name, Parameters given) {
   const IntegratorInfo& info = find_integrator(name);
   Parameters complete = completed(info.name, info.parameters, std::move(given));
   change("choose the integrator");
+  warned_ = false;
   integrator_ = &info;
   parameters_ = std::move(complete);
 }
@@ -347,10 +353,12 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
            " already; give a later end, or change something to start anew");
   terms_.complete(*system_);
   deck_warnings_.clear();
+  warnings_.clear();
   if (output_)
     describe(plan, begun, hooks);
-  else if (!begun && text_.empty())
+  else if (!begun && text_.empty() && !std::exchange(warned_, true))
     warn_of_start(hooks);
+  warnings_ = deck_warnings_;
   Parameters parameters = parameters_;
   if (!integrator_->stepping) choose_epoch(*system_, parameters, begun ? step_ : 0);
   step_ = parameters.real("step");

@@ -36,8 +36,8 @@ struct Columns {
 struct RunHooks {
   std::function<bool(const Statistics&)> stop;  ///< before each step; true: the run ends there
   std::function<void()> show;                   ///< at the intervals of the plan; the session then shows that time
-  std::function<std::string()> deck;            ///< the present state as a deck; a run without files needs only counts
-  std::string script;                           ///< the file that describes the run, unless it is a deck
+  std::function<std::string()> deck;  ///< the present state as a deck, without files only the counts of particles
+  std::string script;                 ///< the file of the program, which stands for a deck in the files
 };
 
 /// The averages that a run computes, by name.
@@ -147,7 +147,6 @@ class Session {
   void rest(Particles<D>& particles);
   void warn(const RunRecord<D>* record);
   void warn_of_start(const RunHooks& hooks);
-  void warn_of_deck(const std::vector<std::string>& warnings);
   void show(const Snapshot<D>& shot, const RunHooks& hooks);
   void describe(Plan& plan, bool begun, const RunHooks& hooks);
   void push(const Simulation<D>& run);
@@ -189,6 +188,7 @@ class Session {
   const RunRecord<D>* record_ = nullptr;            // record of the active run
   Averages averages_;
   std::vector<std::string> deck_warnings_, warnings_;  // of the start of a run; of a run
+  bool warned_ = false;  // of this system; changes of velocities and spins are no reason to look again
   Parameters deck_output_;
 };
 

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The files of a session's runs: their deck, their state, the averages.
 
+#include <sstream>
+#include <string_view>
+
 #include "engine/laws/bath_options.h"
 #include "engine/setup/placement.h"
 #include "io/deck/deck_source.h"
@@ -68,19 +71,20 @@ void change_value(const Fields& fields, const std::string& name, const std::func
   }
 }
 
-/// The deck that the session has written; the places in its errors would say nothing.
-Deck written_deck(const RunHooks& hooks, std::span<const std::string> set) {
-  try {
-    return read_deck(hooks.script, set, [&](const std::filesystem::path&) { return std::optional(hooks.deck()); });
-  } catch (const Error& error) {
-    std::string what = error.what();
-    for (std::size_t line = 0; line != std::string::npos; line = what.find('\n', line)) {
-      if (line > 0) ++line;
-      const std::size_t end = what.find('\n', line), sign = what.find(": error: ", line);
-      if (sign < end) what.erase(line, sign + 9 - line);
-    }
-    throw Error(error.failure(), what);
+/// The lines of an error or a warning without their places, which are those of a deck that the session has written.
+std::string without_places(const std::string& text, std::string_view before) {
+  std::istringstream lines(text);
+  std::string all;
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t at = line.find(before);
+    all += (all.empty() ? "" : "\n") + (at == std::string::npos ? line : line.substr(at + before.size()));
   }
+  return all;
+}
+
+/// The deck that the session has written.
+Deck written_deck(const RunHooks& hooks, std::span<const std::string> set) {
+  return read_deck(hooks.script, set, [&](const std::filesystem::path&) { return std::optional(hooks.deck()); });
 }
 
 }  // namespace
@@ -115,17 +119,26 @@ void Session<D>::set_output(std::vector<std::string> set, double thermo_interval
 template <int D>
 void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
   if (!begun) {
-    Deck deck = text_.empty() ? written_deck(hooks, *output_)
-                              : read_deck(file_, *output_, [&](const std::filesystem::path& path) {
-                                  return path == file_ ? std::optional(text_) : read_text(path);
-                                });
-    set_ends(deck, plan);
-    build_system<D>(deck, nullptr, nullptr, [&] {
+    const auto placing = [&] {
       if (hooks.stop && hooks.stop(statistics_))
         throw Error(Failure::interrupted, "stopped while the particles were placed; no file was written");
-    });
-    if (text_.empty()) warn_of_deck(deck.warnings);
-    deck_ = std::move(deck);
+    };
+    try {
+      Deck deck = text_.empty() ? written_deck(hooks, *output_)
+                                : read_deck(file_, *output_, [&](const std::filesystem::path& path) {
+                                    return path == file_ ? std::optional(text_) : read_text(path);
+                                  });
+      set_ends(deck, plan);
+      build_system<D>(deck, nullptr, nullptr, placing);
+      if (text_.empty()) {
+        for (std::string& each : deck.warnings) each = "warning: " + without_places(each, ": warning: ");
+        if (!std::exchange(warned_, true)) deck_warnings_ = deck.warnings;
+      }
+      deck_ = std::move(deck);
+    } catch (const Error& error) {
+      if (!text_.empty()) throw;
+      throw Error(error.failure(), without_places(error.what(), ": error: "));
+    }
   } else {
     set_tables(*deck_, "contact", contacts_);  // laws and the bath may have changed since the last run
     set_tables(*deck_, "bath", baths());
@@ -145,28 +158,25 @@ void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
   plan.from_equilibrium = of.from_equilibrium;
 }
 
-/// Takes over warnings about a deck that the session has written itself, so that their places say nothing.
-template <int D>
-void Session<D>::warn_of_deck(const std::vector<std::string>& warnings) {
-  for (const std::string& each : warnings) {
-    const std::size_t what = each.find("warning: ");
-    deck_warnings_.push_back(what == std::string::npos ? each : each.substr(what));
-  }
-}
-
-/// The warnings that a deck of this simulation would get before its run. They are found on a copy of the system.
+/// Finds the warnings that a deck of this simulation would get before its run, on a copy of the system. There are none
+/// if no deck can say what the simulation is: only a run with files must be a deck.
 template <int D>
 void Session<D>::warn_of_start(const RunHooks& hooks) {
-  const Deck deck = written_deck(hooks, {});
-  System<D> copy;
-  copy.box = box_;
-  copy.species = species_;
-  copy.particles = system_->particles;
-  copy.need_spins();
-  terms_.make(copy);
   Problems problems;
-  warn_of_state(deck, copy, problems);
-  warn_of_deck(problems.warnings());
+  try {
+    const Deck deck = written_deck(hooks, {});
+    System<D> copy;
+    copy.box = box_;
+    copy.species = species_;
+    copy.particles = system_->particles;
+    copy.need_spins();
+    terms_.make(copy);
+    warn_of_state(deck, copy, problems);
+  } catch (const Error&) {
+    return;
+  }
+  for (const std::string& each : problems.warnings())
+    deck_warnings_.push_back("warning: " + without_places(each, ": warning: "));
 }
 
 /// Sets the velocities from a callback, between two steps. The added energy counts as work, like that of moving walls,

@@ -82,6 +82,7 @@ DECKS = [
     force("inverse-power", epsilon=1.0, sigma=0.9, exponent=12.0, **PAIR, **SMOOTH, periodic=True),
     force("table", **POINTS, slope=[-5.0, 0.0], **PAIR, cutoff=2.0, cut="switch", switch_from=1.5),
     force("table", file="points.txt"),
+    deck(interaction=[{"type": "harmonic-bond", "pairs": [[0, 1]], "stiffness": 1e4, "rest_length": 2.0}]),  # with a warning
     force("uniform-field", acceleration=[0.0, -1.0]), force("uniform-field", electric_field=[0.0, -1.0]),
     force("harmonic-trap", stiffness=1.0, centre=[6.0, 3.0]),
     method("free-flight", step=0.5, lengthen=False, max_events_per_step=1000),
@@ -154,11 +155,16 @@ def test_a_deck_and_calls_make_the_same_simulation(number, tmp_path, monkeypatch
     (tmp_path / "points.txt").write_text("".join(f"{r} {v}\n" for r, v in zip(POINTS["r"], POINTS["value"])))
     deck = DECKS[number]
     end = {"time" if key == "end_time" else key: value for key, value in deck["run"].items()}
-    texts = []
+    texts, states = [], []
     for name, sim in (("deck", carom.Simulation.from_deck(deck)), ("calls", by_calls(deck))):
         sim.write_deck(f"{name}.toml", **end)
         texts.append(tomllib.loads((tmp_path / f"{name}.toml").read_text()))
-    assert texts[0] == texts[1]
+        warned = {text.split("warning: ")[-1] for text in sim.warnings}
+        if "output" not in deck:
+            sim.run(steps=2)
+        warned |= {text.split("warning: ")[-1] for text in sim.warnings}
+        states.append((sim.energy, sim.position.tobytes(), sim.velocity.tobytes(), sim.collisions, warned))
+    assert texts[0] == texts[1] and states[0] == states[1]
     if "output" in deck:  # whose resolved decks are files
         resolved = []
         one = carom.Simulation.from_deck(deck)

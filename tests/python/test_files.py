@@ -308,6 +308,12 @@ def test_the_interval_of_calls_is_that_of_the_rows(tmp_path):
     assert np.allclose(times, [0, 0.5, 1]) and np.allclose(sim.open().thermo["time"], times)
     with pytest.raises(carom.UsageError, match="the rows of thermo.csv come every 0.5"):
         sim.run(time=2, every=0.25, callback=print)
+    sim.output()
+    for wrong in (-1, "x", float("nan")):
+        with pytest.raises(carom.UsageError, match="run: 'every' is .*; give a positive number"):
+            sim.run(every=wrong)
+    sim.run()
+    assert np.allclose(sim.open().thermo["time"], [0, 0.25, 0.5, 0.75, 1]), "a refused interval leaves nothing behind"
     sim.output(thermo_interval=0.25)
     with pytest.raises(carom.UsageError, match="the rows of thermo.csv come every 0.25"):
         sim.run(time=2, every=0.5, callback=print)
@@ -319,3 +325,7 @@ def test_the_files_name_the_script(tmp_path):
                       "sim.integrator('psa', step=0.01)\nsim.output('run')\nsim.run(steps=5)\n")
     subprocess.run([sys.executable, script], cwd=tmp_path, check=True)
     assert "scan.py" in (tmp_path / "run/run.log").read_text() and "simulation.py" not in (tmp_path / "run/run.log").read_text()
+    # The places in the deck that the session has written are no lines of the script.
+    script.write_text(script.read_text().replace("[[2, 3]]", "[[2, 3], [2.5, 3]]"))
+    failed = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True).stderr
+    assert "InitialStateError: 1 pair of spheres overlaps" in failed, failed

@@ -111,7 +111,9 @@ def write_deck(sim, file, ends, every):
         raise UsageError("write_deck: the deck has no end; give time, steps or collisions")
     deck = deck_of(sim, "write_deck", ends)
     output = sim._deck_output if sim._output is None else sim._output
-    deck["output"] = {key: output[key] for key in output if key != "directory"} | ({} if every is None else {"frame_interval": float(every), "thermo_interval": float(every)})
+    deck["output"] = {key: output[key] for key in output if key not in ("directory", "overwrite")}  # those of the runs of this simulation
+    if every is not None:
+        deck["output"] |= {"frame_interval": float(every), "thermo_interval": float(every)}
     try:
         pathlib.Path(file).write_text(toml_text(deck))
     except OSError as error:
@@ -128,5 +130,5 @@ def script_name():
     file = getattr(sys.modules["__main__"], "__file__", None)
     if not file:
         return "simulation.py"
-    path = pathlib.Path(file).resolve()
-    return str(path.relative_to(pathlib.Path.cwd())) if path.is_relative_to(pathlib.Path.cwd()) else str(path)
+    path, here = pathlib.Path(file).resolve(), pathlib.Path.cwd()
+    return str(path.relative_to(here) if path.is_relative_to(here) else path)

@@ -73,7 +73,8 @@ class Simulation:
         refuse_ranks()
         self._session, self.title, self.description, self.warnings = session, title, description, []
         self._cores = False  # a radius was given
-        self._deck_output, self._output = {}, None  # the keys of [output] of the deck, and those that hold; None: no files
+        self._deck_output, self._output = {}, None  # keys of [output]: the deck's, and those of runs; None: runs write no files
+        self._every = False  # whether run(every=…) may set the thermo_interval, which is then the deck's
         self._edges_known, self._counted, self._spinning, self._inertias, self.bonds = True, [], [], {}, np.empty((0, 2), int)
 
     def _warn(self, texts, level=3):
@@ -258,7 +259,7 @@ class Simulation:
         if old.method:
             session.set_integrator(old.method, old.method_parameters)
         if self._output:
-            self._set_output(session)
+            self._set_output(session, self._output)
         self._session, self._edges_known, self._counted, self._spinning, self._inertias = session, True, [], [], {}
         self._warn(texts)
         return range(len(self))
@@ -330,6 +331,8 @@ class Simulation:
 
     def add_force(self, type, **parameters):
         """Adds a term of V by its name in decks; see carom.describe(type). Add the particles and species that it names first."""
+        if isinstance(parameters.get("file"), os.PathLike):
+            parameters["file"] = os.fspath(parameters["file"])
         self._session.add_force(name_of("add_force", type), refuse_masked(type, parameters))
 
     def add_potential(self, expression, start, cutoff, tolerance=1e-8, options=None, **constants):
@@ -368,13 +371,14 @@ class Simulation:
         if "directory" not in output:
             raise UsageError("output: there is no 'directory'; give one, since there is no deck that does")
         refuse_masked("output", output)
-        self._output = output | {"directory": os.path.abspath(os.fspath(output["directory"]))}
-        self._every = thermo_interval is None and "thermo_interval" in output  # a deck's, which run(every=…) replaces
-        self._set_output(self._session)
+        output["directory"] = os.path.abspath(os.fspath(output["directory"]))
+        self._set_output(self._session, output)
+        self._every = thermo_interval is None and "thermo_interval" in output
 
-    def _set_output(self, session):
-        session.set_output([f"output.{key}={toml_value(value)}" for key, value in self._output.items()],
-                           float(self._output.get("thermo_interval", 0)))
+    def _set_output(self, session, output):
+        session.set_output([f"output.{key}={toml_value(value)}" for key, value in output.items()],
+                           float(output.get("thermo_interval", 0)))
+        self._output = output
 
     @property
     def directory(self):
@@ -418,7 +422,8 @@ class Simulation:
         of the deck.
 
         time [time], steps, collisions: the run ends at the first of them that it reaches.
-        every: instead of the thermo_interval of a deck; that of output() must be the same.
+        every: if the run writes files, this replaces the thermo_interval of a deck when the run begins, and must equal the
+        thermo_interval that was given to output().
         callback(simulation) is called at intervals of `every` units of simulated time, and at the start and the end; it may set
         velocities. An exception in it ends the run at the end of the step (in free flight: after 500 000 collisions, or at the end of
         the epoch) and is passed on. So does Ctrl-C, as KeyboardInterrupt; the simulation can be used and continued afterwards.
@@ -435,12 +440,13 @@ class Simulation:
         if self._cores and self._session.method == "verlet":
             raise UsageError("run: verlet treats particles as points and would ignore 'radius'; take psa or edda, where spheres collide, "
                              "or leave radius out")
-        if self._output and self._every and every not in (None, self._session.interval) and not self._session.begun:
-            self._output["thermo_interval"] = every
-            self._set_output(self._session)
+        if self._output and self._every and every is not None and not self._session.begun and every != self._session.interval:
+            if not (isinstance(every, numbers_type.Real) and 0 < every < np.inf):
+                raise UsageError(f"run: 'every' is {every!r}; give a positive number")
+            self._set_output(self._session, self._output | {"thermo_interval": float(every)})
         try:
             self._session.run(ends, callback and (lambda: callback(self)), line,
-                              lambda whole: toml_text(deck_of(self, "run", {"steps": 1}, whole)), script_name())
+                              lambda whole: toml_text(deck_of(self, "run", {"steps": 1}, whole)), script_name() if self._output else "simulation.py")
         finally:
             if line:
                 line.close()

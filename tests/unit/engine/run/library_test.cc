@@ -75,6 +75,8 @@ TEST(Library, MistakesAreErrorsWithARemedy) {
   expect_says(run_message(Failure::deck, none, "cdda", {{"step", 0.1}, {"order", 3}}), "'order' cannot be '3'");
   expect_says(run_message(Failure::deck, none, "mcva", {{"step", 0.1}, {"variant", "other"}}), "give one of: grid");
   expect_says(run_message(Failure::deck, none, "psa", {{"step", 0.1}}, {}), "the run has no end");
+  expect_says(run_message(Failure::deck, none, "verlet", {{"step", 0.1}}, {.collisions = 5}),
+              "'verlet' has no collisions, the run would never end; give steps or end_time");
   expect_says(run_message(Failure::initial_state, [](auto& s) { s.particles.mass.pop_back(); }),
               "'mass' of the particles has 1 entries, x has 2; give each particle one");
   expect_says(run_message(Failure::initial_state, [](auto& s) { s.particles.mass[1] = 0; }), "mass of particle 1");
