@@ -47,8 +47,8 @@ std::vector<Traveller<D>> travellers(const System<D>& system, const Particles<D>
   Communicator* const others = system.decomposition.others();
   for (Id i = 0; i < p.size(); ++i) {
     if (!p.owns(i)) continue;
-    Traveller<D> one{p.id_of(i), p.species[i], moving_mass(p.mass[i]), p.charge[i], p.x[i], p.v[i]};
-    for (int k = 0; k < D; ++k) one.x[k] += static_cast<double>(p.image[i][k]) * system.box.edges[k];
+    Traveller<D> one{
+        p.id_of(i), p.species[i], moving_mass(p.mass[i]), p.charge[i], p.x[i] + system.box.shift(p.image[i]), p.v[i]};
     if (others)
       put(mine, one);
     else

@@ -17,9 +17,7 @@ MeanSquaredDisplacement<D>::MeanSquaredDisplacement(const System<D>& system, con
 template <int D>
 void MeanSquaredDisplacement<D>::add_sample(double time, const Particles<D>& particles) {
   now_.resize(particles.size());
-  for (std::size_t i = 0; i < particles.size(); ++i)
-    for (int k = 0; k < D; ++k)
-      now_[i][k] = particles.x[i][k] + static_cast<double>(particles.image[i][k]) * system_.box.edges[k];
+  for (std::size_t i = 0; i < particles.size(); ++i) now_[i] = particles.x[i] + system_.box.shift(particles.image[i]);
   const std::uint64_t index = this->samples();
   if (index == 0) {
     species_ = particles.species;

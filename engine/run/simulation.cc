@@ -143,7 +143,10 @@ std::array<double, 2> ramp_times(const Plan& plan, std::int64_t start_step, doub
 template <int D>
 Simulation<D>::Simulation(std::unique_ptr<System<D>>&& system, const IntegratorInfo& info,
                           std::unique_ptr<Integrator<D>> integrator, Plan plan)
-    : plan_(checked(plan, info, system->box.bath)), system_(std::move(system)), info_(info), integrator_(std::move(integrator)) {}
+    : plan_(checked(plan, info, system->box.bath)),
+      system_(std::move(system)),
+      info_(info),
+      integrator_(std::move(integrator)) {}
 
 template <int D>
 typename Simulation<D>::Prepared Simulation<D>::prepare(const System<D>& system, const IntegratorInfo& info,

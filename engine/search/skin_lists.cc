@@ -158,7 +158,7 @@ std::span<const std::uint32_t> SkinLists<D>::renew(Slot i, const Vec<D>& x) {
 template <int D>
 void SkinLists<D>::shift(Slot i, const Image<D>& boxes) {
   NextEvent<D>& a = next_events_[i];
-  for (int k = 0; k < D; ++k) a.where.centre[k] += boxes[k] * box_.edges[k];
+  Eigen::Map<Vec<D>>(a.where.centre) += box_.shift(boxes);
   const std::int32_t linear = packing_.linear(boxes);
   boxes_[i] += linear;
   std::uint32_t* const list = lists_.of(a);

@@ -95,8 +95,8 @@ template <int D>
 double default_distance(std::size_t particles, double volume);
 
 /// Replaces the `file` of a table potential, relative to `folder`, by its points, and sets a missing cutoff to the last
-/// point. Returns what is wrong, in the form "what; remedy", or nothing. Throws Error(Failure::file), and Failure::deck for
-/// errors in the file.
+/// point. Returns what is wrong, in the form "what; remedy", or nothing. Throws Error(Failure::file), and Failure::deck
+/// for errors in the file.
 std::string read_points(Parameters& table, const std::filesystem::path& folder, const TextReader& reader);
 
 /// The rows of a table of numbers: `columns` a line, separated by commas or blanks; # begins a comment, and the first

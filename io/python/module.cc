@@ -72,7 +72,7 @@ Plan plan_of(const py::dict& ends, double every) {
 template <int D>
 void run(Session<D>& session, const Plan& plan, const py::object& callback, const py::object& progress,
          const py::object& deck, const std::string& script) {
-  const std::string text = session.needs_deck() ? py::cast<std::string>(deck(session.writes_files())) : "";
+  std::string text = session.needs_deck() ? py::cast<std::string>(deck(session.writes_files())) : "";
   using Clock = std::chrono::steady_clock;
   constexpr std::chrono::milliseconds kTimeBetweenChecks(50);
   std::optional<py::error_already_set> raised;

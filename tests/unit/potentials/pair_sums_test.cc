@@ -22,8 +22,8 @@ namespace {
 using namespace std::string_literals;
 using test::cut_lennard_jones;
 using test::expect_reference;
-using test::Options;
 using test::kQuantum;
+using test::Options;
 using test::Outcome;
 using test::outcome;
 using test::quanta;
@@ -272,10 +272,10 @@ TEST(PairSums, DoNotDependOnTheOrderOfTheParticles) {
   reverse(turned.particles.charge);
   reverse(turned.particles.species);
   const Options given = {{"constant", 1.3},
-                       {"form", "damped-shifted"s},
-                       {"damping", 0.9},
-                       {"cutoff", 2.4},
-                       {"species", std::vector<std::string>{"A", "B"}}};
+                         {"form", "damped-shifted"s},
+                         {"damping", 0.9},
+                         {"cutoff", 2.4},
+                         {"species", std::vector<std::string>{"A", "B"}}};
   auto x_new = test::displaced(scene.particles.x, scene.random_vectors(0.2), 1);
   Outcome<3> one = outcome(*scene.make("coulomb", given), scene.particles.x, x_new);
   reverse(x_new);

@@ -38,9 +38,7 @@ TEST(SweepControl, ConvergesWhereRoundingKeepsTheResidualUp) {
 }
 
 TEST(SweepControl, StallsWhereSixSweepsReduceTheResidualByLessThanTen) {
-  const auto contraction = [](double last) {
-    return after({1, 1, 1, 1, 1, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, last});
-  };
+  const auto contraction = [](double last) { return after({1, 1, 1, 1, 1, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, last}); };
   EXPECT_TRUE(contraction(1.01e-4).stalls(0));
   EXPECT_FALSE(contraction(0.99e-4).stalls(0));
   // Stiffness explains a contraction by the sixth power of its rate; half of that remains a stall.
