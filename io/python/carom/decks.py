@@ -98,7 +98,7 @@ def species_of(sim, of):
 
 
 def counts_of(sim):
-    """The tables [[particles]] of a deck whose particles are somewhere."""
+    """The tables [[particles]] of a deck with counts in place of positions and velocities."""
     numbers, fixed = np.bincount(sim.species, minlength=len(sim.species_names)), np.isinf(sim.mass)
     radius = float(sim.radius.max(initial=0.5))
     return [{"name": name, "count": int(count), "temperature": 0.0, "radius": radius, "fixed": bool(fixed[sim.species == kind].all())}
@@ -111,7 +111,7 @@ def write_deck(sim, file, ends, every):
         raise UsageError("write_deck: the deck has no end; give time, steps or collisions")
     deck = deck_of(sim, "write_deck", ends)
     output = sim._deck_output if sim._output is None else sim._output
-    deck["output"] = {key: output[key] for key in output if key not in ("directory", "overwrite")}  # those of the runs of this simulation
+    deck["output"] = {key: output[key] for key in output if key not in ("directory", "overwrite")}  # another run has its own files
     if every is not None:
         deck["output"] |= {"frame_interval": float(every), "thermo_interval": float(every)}
     try:

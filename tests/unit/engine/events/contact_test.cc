@@ -32,10 +32,8 @@ Precise gap_squared(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double si
   return sum;
 }
 
-/// Finds the first contact by small steps along the path: slow, and it misses only overlaps shorter than a step.
-template <int D>
-double walked_contact(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double sigma, double rest, int steps) {
-  auto gap = [&](double s) { return (d + s * v + (0.5 * s * s) * a).squaredNorm() - sigma * sigma; };
+/// The end of the first of so many equal intervals of [0, rest] in which the gap closes, by bisection; kNever if none.
+double walked_root(auto&& gap, double rest, int steps) {
   for (int k = 0; k < steps; ++k) {
     double lo = rest * k / steps, hi = rest * (k + 1) / steps;
     if (!(gap(lo) > 0 && gap(hi) <= 0)) continue;
@@ -43,6 +41,13 @@ double walked_contact(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double 
     return hi;
   }
   return kNever;
+}
+
+/// Finds the first contact by small steps along the path: slow, and it misses only overlaps shorter than a step.
+template <int D>
+double walked_contact(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double sigma, double rest, int steps) {
+  auto gap = [&](double s) { return (d + s * v + (0.5 * s * s) * a).squaredNorm() - sigma * sigma; };
+  return walked_root(gap, rest, steps);
 }
 
 template <class T>
@@ -103,13 +108,7 @@ Precise grown_gap(const Vec<D>& d, const Vec<D>& v, double sigma, double w, doub
 template <int D>
 double walked_growth(const Vec<D>& d, const Vec<D>& v, double sigma, double w, double rest, int steps) {
   auto gap = [&](double s) { return (d + s * v).norm() - (sigma + w * s); };
-  for (int k = 0; k < steps; ++k) {
-    double lo = rest * k / steps, hi = rest * (k + 1) / steps;
-    if (!(gap(lo) > 0 && gap(hi) <= 0)) continue;
-    for (int bisection = 0; bisection < 80; ++bisection) (gap(0.5 * (lo + hi)) > 0 ? lo : hi) = 0.5 * (lo + hi);
-    return hi;
-  }
-  return kNever;
+  return walked_root(gap, rest, steps);
 }
 
 TYPED_TEST(Contact, GrowingSpheresMeetWhereWalkingFindsThem) {

@@ -10,22 +10,12 @@
 #include "engine/events/shaken_contact.h"
 #include "engine/forces/add_interaction.h"
 #include "tests/support/experiments.h"
+#include "tests/unit/engine/laws/contact_collector.h"
 
 namespace carom::moving_walls_test {
 namespace {
 
 const std::vector<std::string> kMethods = {"free-flight", "psa", "cva", "mcva", "cdda", "edda"};
-
-class Log : public Observer<2> {
- public:
-  void contacts(double start, std::span<const Contact<2>> more) override {
-    for (Contact<2> contact : more) {
-      contact.key.time += start;
-      all.push_back(contact);
-    }
-  }
-  std::vector<Contact<2>> all;
-};
 
 /// Discs bounce in a wedge under gravity: every contact is at a wall or between discs, and the energy stays.
 TEST(FurtherWalls, DiscsInAWedgeKeepTheirEnergy) {
@@ -36,7 +26,7 @@ TEST(FurtherWalls, DiscsInAWedgeKeepTheirEnergy) {
     system->box.add({.name = "right", .normal = {-1, 1}, .offset = -5});
     add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
     auto run = test::make_run<2>(std::move(system), method, {.step = 0.01, .end_time = 20, .events = true});
-    Log log;
+    test::ContactCollector log;
     run->add(log);
     run->run();
     const Statistics& s = run->statistics();
@@ -137,7 +127,7 @@ TEST(ShakenWalls, WorkIsTheEnergyGained) {
     system->box.add({.name = "y-", .amplitude = kAmplitude, .frequency = kFrequency});
     add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
     auto run = test::make_run<2>(std::move(system), method, {.step = 0.01, .end_time = 20, .events = true});
-    Log log;
+    test::ContactCollector log;
     run->add(log);
     run->run();
     const Statistics& s = run->statistics();

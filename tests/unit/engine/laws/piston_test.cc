@@ -10,6 +10,7 @@
 #include "engine/ranks/id_blocks.h"
 #include "tests/support/experiments.h"
 #include "tests/support/thread_ranks.h"
+#include "tests/unit/engine/laws/contact_collector.h"
 
 namespace carom::piston_test {
 namespace {
@@ -25,25 +26,13 @@ std::unique_ptr<System<2>> one_sphere(double length, double speed, double piston
   return system;
 }
 
-/// Collects contacts, with times since the start of the run.
-class Log : public Observer<2> {
- public:
-  void contacts(double start, std::span<const Contact<2>> more) override {
-    for (Contact<2> contact : more) {
-      contact.key.time += start;
-      all.push_back(contact);
-    }
-  }
-  std::vector<Contact<2>> all;
-};
-
 /// The piston moves at speed u. From one contact to the next, with the speed v before and the free length ℓ of the
 /// centre, the sphere takes 2ℓ/(v + 3u) and conserves (v + u)ℓ: the exact form of the adiabatic invariant v ℓ of slow
 /// pistons.
 void expect_exact_bounces(const std::string& method, double step, double tolerance) {
   const double length = 10, u = 0.0625, end = 100;
   auto run = test::make_run<2>(one_sphere(length, 1.3, -u), method, {.step = step, .end_time = end, .events = true});
-  Log log;
+  test::ContactCollector log;
   run->add(log);
   run->run();
   double time = (length - 2 * kRadius) / (1.3 + u), v = 1.3, room = length - 2 * kRadius - u * time, work = 0;
