@@ -21,9 +21,9 @@ struct Statistics;
 struct StepCount {
   std::int64_t steps = 0;
   double time = 0;
-  /// How far an epoch of free flight has advanced that needs several slabs [time].
+  /// How far an epoch of free flight that needs several slabs has advanced [time].
   double within = 0;
-  /// What happened in the epoch so far.
+  // What happened in the epoch so far:
   double boxes = 0;            ///< PastEpoch::boxes
   std::uint64_t contacts = 0;  ///< of pairs twice
   /// Free flight with contacts that dissipate: an epoch is as many steps long as the gas is slower than at the start.

@@ -29,8 +29,8 @@ struct PastEpoch {
 
 /// How long the epoch after this one should be: forty events of a sphere, if the spheres then neither fly through more
 /// boxes than can be counted nor so far that times and positions lose digits; 0 if walls or a field give spheres
-/// energy, so that their speeds are unknown. The default epoch is shorter if few
-/// spheres have most of the energy, since it allows for the equilibrium to come. Collective.
+/// energy, so that their speeds are unknown. The default epoch is shorter if few spheres have most of the energy, since
+/// it allows for the equilibrium to come. Collective.
 template <int D>
 double next_epoch(const System<D>& system, const PastEpoch& past);
 
