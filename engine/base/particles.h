@@ -21,6 +21,15 @@ inline bool is_fixed(double mass) { return std::isinf(mass); }
 /// The mass in sums of energies and momenta: 0 for a fixed sphere, which has neither.
 inline double moving_mass(double mass) { return is_fixed(mass) ? 0 : mass; }
 
+/// The internal state of a sphere: what contacts change besides its record (record.h). Cores, traces, messages and
+/// blocks pass it on without naming its parts; a new state is declared here and in Particles::for_each_internal().
+template <int D>
+struct Internal {
+  Spin<D> spin = Spin<D>::Zero();  ///< angular velocity [1/time]
+
+  bool operator==(const Internal&) const = default;
+};
+
 /// The argument of Particles::add().
 template <int D>
 struct Particle {
@@ -65,6 +74,23 @@ struct Particles {
       spin.back() = particle.spin;
     }
     return static_cast<Id>(x.size() - 1);
+  }
+  /// Calls visit(array, member of Internal) for each array of the internal state; arrays may be empty.
+  template <class Visit>
+  void for_each_internal(Visit&& visit) {
+    visit(spin, &Internal<D>::spin);
+  }
+  /// The internal state of a particle; the arrays must not be empty.
+  Internal<D> internal(Id i) const {
+    Internal<D> state;
+    const_cast<Particles*>(this)->for_each_internal([&](auto& array, auto member) { state.*member = array[i]; });
+    return state;
+  }
+  void set_internal(Id i, const Internal<D>& state) {
+    for_each_internal([&](auto& array, auto member) { array[i] = state.*member; });
+  }
+  void resize_internal(std::size_t n) {
+    for_each_internal([&](auto& array, auto member) { array.resize(n, Internal<D>{}.*member); });
   }
   bool fixed(Id i) const { return is_fixed(mass[i]); }
   bool any_fixed() const { return std::ranges::any_of(mass, is_fixed); }

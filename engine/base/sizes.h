@@ -12,6 +12,15 @@
 
 namespace carom {
 
+/// The reach of a sphere, half the distance at which something can happen to a pair of equal spheres between events:
+/// nothing happens to two spheres whose distance is larger than the sum of their reaches. Searches, halos and windows
+/// use it and not the radius of the hard core, to which only contacts refer.
+inline double reach_of(double radius) { return radius; }
+inline std::vector<double> reaches_of(std::vector<double> radii) {
+  for (double& each : radii) each = reach_of(each);
+  return radii;
+}
+
 struct Sizes {
   std::size_t spheres = 0;           ///< total number of spheres
   bool by_species = false;           ///< indexed by species, else by id
@@ -51,6 +60,7 @@ struct Sizes {
     return mass_of(r.id, r.species);
   }
   double largest_radius() const { return *std::ranges::max_element(radius); }
+  double largest_reach() const { return reach_of(largest_radius()); }
 };
 
 }  // namespace carom

@@ -62,23 +62,23 @@ void EventCore<D>::read(const Particles<D>& particles, const Vec<D>& g, double h
 
 template <int D>
 void EventCore<D>::load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now,
-                        double max_displacement, const std::vector<Spin<D>>& spins) {
+                        double max_displacement, const std::vector<Internal<D>>& internal) {
   const auto order = along_curve<D>(records.size(), [&](std::size_t i) -> const Vec<D>& { return records[i].x; });
   std::vector<Record<D>> sorted(records.size());
   for (std::size_t i = 0; i < records.size(); ++i) sorted[i] = records[order[i]];
   std::vector<Record<D>>().swap(records);
-  std::vector<Spin<D>> sorted_spins(spins.size());
-  for (std::size_t i = 0; i < spins.size(); ++i) sorted_spins[i] = spins[order[i]];
+  std::vector<Internal<D>> sorted_internal(internal.size());
+  for (std::size_t i = 0; i < internal.size(); ++i) sorted_internal[i] = internal[order[i]];
   events_ = since_sort_ = 0;
   now_ = now;
   free_.clear();
   search_.clear();
-  flights_.load(sorted, *sizes_, g, horizon, sorted_spins);
+  flights_.load(sorted, *sizes_, g, horizon, sorted_internal);
   search_.start(now, max_displacement);
 }
 
 template <int D>
-bool EventCore<D>::admit(const Record<D>& r, const Spin<D>& spin, double now, Slot& slot) {
+bool EventCore<D>::admit(const Record<D>& r, const Internal<D>& internal, double now, Slot& slot) {
   if (!free_.empty()) {
     slot = free_.back();
     free_.pop_back();
@@ -87,9 +87,9 @@ bool EventCore<D>::admit(const Record<D>& r, const Spin<D>& spin, double now, Sl
     slot = static_cast<Slot>(flights_.size());
   }
   const double radius = sizes_->radius_of(r);
-  flights_.admit(slot, r, radius, sizes_->mass_of(r), spin);
+  flights_.admit(slot, r, radius, sizes_->mass_of(r), internal);
   queue_.admit(slot);
-  search_.admit(slot, radius, now);
+  search_.admit(slot, reach_of(radius), now);
   queue_.read_versions();
   return true;
 }
@@ -105,8 +105,8 @@ void EventCore<D>::dismiss(Slot i) {
 
 template <int D>
 void EventCore<D>::put(std::span<const Changed> spheres, double now) {
-  for (const auto& [i, r, spin] : spheres) {
-    flights_.set(i, r, spin);
+  for (const auto& [i, r, internal] : spheres) {
+    flights_.set(i, r, internal);
     ++queue_[i].version;
   }
   for (const Changed& each : spheres) search_.move(each.slot, now);
@@ -166,9 +166,9 @@ void EventCore<D>::fly_to(double time, Particles<D>& copies) const {
     copies.x[r.id] = r.x;
     copies.v[r.id] = r.v;
   }
-  if (!flights_.rough()) return;
-  copies.spin.resize(flights_.size());
-  for (Slot i = 0; i < flights_.size(); ++i) copies.spin[flights_[i].id] = flights_.spin(i);
+  if (!flights_.has_internal()) return;
+  copies.resize_internal(flights_.size());
+  for (Slot i = 0; i < flights_.size(); ++i) copies.set_internal(flights_[i].id, flights_.internal(i));
 }
 
 template <int D>
@@ -177,7 +177,7 @@ void EventCore<D>::begin_trace(Slot i, std::uint32_t partner, std::uint32_t gene
   const auto [lo, hi] = flights_[i].id < flights_[j].id ? std::pair(i, j) : std::pair(j, i);
   trace.begin(EventKind::pair, lo, flights_[lo], hi, flights_[hi],
               lo == i ? partner : flights_.packing().reversed(i, partner), generation);
-  if (flights_.rough()) trace.note_spins(flights_.spin(lo), flights_.spin(hi));
+  if (flights_.has_internal()) trace.note_internal(flights_.internal(lo), flights_.internal(hi));
 }
 
 template <int D>
@@ -186,7 +186,7 @@ void EventCore<D>::collide_pair(Slot i, Slot j, std::uint32_t partner, double ti
   const Packing<D>& packing = flights_.packing();
   if (report.trace) begin_trace(i, partner, generation, *report.trace);
   const Vec<D> shift = packing.linear(partner) != 0 ? box_.shift(packing.image(partner)) : Vec<D>(Vec<D>::Zero());
-  const Impact<D> impact = flights_.collide(i, j, shift, time, generation);
+  const EventResult<D> impact = flights_.collide(i, j, shift, time, generation);
   ++queue_[i].version;
   ++queue_[j].version;
   if (report.trace)
@@ -204,9 +204,9 @@ void EventCore<D>::meet_alone(Slot i, std::uint32_t generation, const Report& re
   const EventKey<D> key = queue_.key_of(i);
   if (report.trace) {
     report.trace->begin(key.kind, i, flights_[i], Trace<D>::kNoEntry, flights_[i], key.hi, generation);
-    if (flights_.rough()) report.trace->note_spins(flights_.spin(i), flights_.spin(i));
+    if (flights_.has_internal()) report.trace->note_internal(flights_.internal(i), flights_.internal(i));
   }
-  const Impact<D> impact = flights_.meet_alone(key, i);
+  const EventResult<D> impact = flights_.meet_alone(key, i);
   ++queue_[i].version;
   if (report.trace) return report.trace->end(flights_[i], flights_[i], {key.kind, impact.exchange}, impact.overlap);
   report.counters.add(key.kind, key.hi, impact.exchange);

@@ -73,10 +73,10 @@ class EventCore {
   // For a core that runs part of a larger system (engine/ranks/subdomain.h). No event before the time `now` may be
   // pending.
 
-  /// Starts with these spheres; no record may be later than `now`. find_near() uses `max_displacement`. `spins`: of
-  /// each, if contacts are rough.
+  /// Starts with these spheres; no record may be later than `now`. find_near() uses `max_displacement`. `internal`: the
+  /// internal state of each, if there is one.
   void load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now, double max_displacement,
-            const std::vector<Spin<D>>& spins = {});
+            const std::vector<Internal<D>>& internal = {});
   /// Frees the memory for plans; load() again before the next event.
   void stop() {
     search_.clear();
@@ -89,14 +89,14 @@ class EventCore {
   }
   const Flights<D>& flights() const { return flights_; }
   /// Adds a sphere; false if there is no room: load again.
-  bool admit(const Record<D>& r, const Spin<D>& spin, double now, Slot& slot);
+  bool admit(const Record<D>& r, const Internal<D>& internal, double now, Slot& slot);
   /// Removes a sphere; its slot can be reused.
   void dismiss(Slot i);
-  /// Replaces the records and spins of these spheres.
+  /// Replaces the records and internal states of these spheres.
   struct Changed {
     Slot slot;
     Record<D> record;
-    Spin<D> spin;
+    Internal<D> internal;
   };
   void put(std::span<const Changed> spheres, double now);
   /// Sets the spheres at the border of a subdomain. Their lists contain each other however far they move in a window,

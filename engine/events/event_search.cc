@@ -15,13 +15,13 @@ template <int D>
 void EventSearch<D>::start(double now, double max_displacement) {
   max_displacement_ = max_displacement;
   setting_ = flights_.setting();
-  std::vector<double> radii = flights_.radii(flights_.horizon());
-  if (lists_ && radii_ == radii) {  // lists are reused in the next slab if the radii are unchanged
+  std::vector<double> reaches = flights_.reaches(flights_.horizon());
+  if (lists_ && reaches_ == reaches) {  // lists are reused in the next slab if the reaches are unchanged
     lists_->follow(flights_.records());
   } else {
     clear();
     queue_.clear();
-    radii_ = std::move(radii);
+    reaches_ = std::move(reaches);
     choose(now);
   }
   for (Slot i = 0; i < flights_.size(); ++i) {
@@ -38,11 +38,11 @@ void EventSearch<D>::choose(double now) {
   at_border_.clear();
   // The density is that of the whole system: a subdomain has a part of it, perhaps no spheres yet, and may receive
   // larger ones.
-  const std::vector<double>& radii = flights_.size() == 0 && sizes_ ? sizes_->radius : radii_;
+  const std::vector<double>& radii = flights_.size() == 0 && sizes_ ? sizes_->radius : reaches_;
   if (counts_.predictions == 0) tuning_ = SearchTuning(options_);
   Extent<D> extent = flights_.extent();
   if (sizes_) {
-    largest_ = sizes_->largest_radius();
+    largest_ = sizes_->largest_reach();
     extent.particles = sizes_->spheres;
   } else {
     largest_ = *std::max_element(radii.begin(), radii.end());
@@ -63,8 +63,8 @@ void EventSearch<D>::choose(double now) {
   double skin = tuning_.skin();
   for (int k = 0; k < D; ++k)
     if (box_.periodic(k)) skin = std::min(skin, 0.2 * box_.edges[k]);  // below half a box: images stay distinct
-  lists_ = std::make_unique<SkinLists<D>>(box_, flights_.packing(), kernels_, radii_, flights_.equal(), largest_, skin,
-                                          queue_.plans());
+  lists_ = std::make_unique<SkinLists<D>>(box_, flights_.packing(), kernels_, reaches_, flights_.equal(), largest_,
+                                          skin, queue_.plans());
   lists_->build(
       flights_.size(), [&](Slot i) { return flights_.at(i, now).x; }, extent, max_displacement_);
 }
@@ -216,16 +216,16 @@ void EventSearch<D>::cross(Slot i, double now) {
 }
 
 template <int D>
-void EventSearch<D>::admit(Slot i, double radius, double now) {
+void EventSearch<D>::admit(Slot i, double reach, double now) {
   if (!flights_.equal()) {
-    radii_.resize(std::max<std::size_t>(radii_.size(), i + 1));
-    radii_[i] = radius;
+    reaches_.resize(std::max<std::size_t>(reaches_.size(), i + 1));
+    reaches_[i] = reach;
   }
   setting_ = flights_.setting();
   if (!at_border_.empty()) at_border_[i] = border_fits() ? 1 : 0;
   const Vec<D> x = flights_.at(i, now).x;
   if (lists_) {
-    lists_->admit(i, x, radii_);
+    lists_->admit(i, x, reaches_);
   } else {
     queue_[i].where.cell = cells_->place(x);
     cells_->admit(i, queue_[i].where.cell);

@@ -45,7 +45,7 @@ class EventSearch {
   void look_again(Slot i, double now);
 
   /// Adds a sphere that flights and queue already have.
-  void admit(Slot i, double radius, double now);
+  void admit(Slot i, double reach, double now);
   void dismiss(Slot i);
   /// Updates the search after the record of a sphere has been replaced.
   void move(Slot i, double now);
@@ -106,8 +106,8 @@ class EventSearch {
   std::unique_ptr<LinkedCells<D>> cells_;
   Candidates found_, others_;
   std::vector<std::uint32_t> near_;
-  std::vector<double> radii_;                  // for which lists or cells were made; one value if all are equal
-  double max_displacement_ = 0, largest_ = 0;  // bound on displacements (load); largest radius
+  std::vector<double> reaches_;                // for which lists or cells were made; one value if all are equal
+  double max_displacement_ = 0, largest_ = 0;  // bound on displacements (load); largest reach
   std::vector<std::uint8_t> at_border_;        // by slot; empty if there is no border
   bool small_ = true, large_ = false;          // fits into a fast cache; fits into no cache
   EventCounts counts_;

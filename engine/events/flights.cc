@@ -32,7 +32,7 @@ void Flights<D>::load(const Particles<D>& particles, const Vec<D>& g, double hor
   g_ = g;
   field_ = g != Vec<D>::Zero();
   growth_ = growth;
-  rough_ = laws().rough();
+  has_internal_ = laws().need_internal();
   horizon_ = horizon;
   common_radius_ = common(particles.radius);
   common_mass_ = common(particles.mass);
@@ -43,9 +43,9 @@ void Flights<D>::load(const Particles<D>& particles, const Vec<D>& g, double hor
     if (common_mass_ == 0) mass_.push_back(particles.mass[r.id]);
     r = {particles.x[r.id], particles.v[r.id], 0.0, r.id, 0, particles.species[r.id]};
   }
-  spins_.clear();
-  if (rough_)
-    for (const Record<D>& r : records_) spins_.push_back(particles.spin[r.id]);
+  internal_.clear();
+  if (has_internal_)
+    for (const Record<D>& r : records_) internal_.push_back(particles.internal(r.id));
 }
 
 template <int D>
@@ -56,10 +56,10 @@ void Flights<D>::set_surroundings() {
 }
 
 template <int D>
-std::vector<double> Flights<D>::radii(double t) const {
+std::vector<double> Flights<D>::reaches(double t) const {
   std::vector<double> all = radius_.empty() ? std::vector<double>{common_radius_} : radius_;
   for (double& r : all) r = grown(r, t);
-  return all;
+  return reaches_of(std::move(all));
 }
 
 template <int D>
@@ -88,12 +88,12 @@ ScanSetting Flights<D>::setting() const {
 
 template <int D>
 void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon,
-                      std::span<const Spin<D>> spins) {
+                      std::span<const Internal<D>> internal) {
   set_surroundings();
   g_ = g;
   field_ = g != Vec<D>::Zero();
   growth_ = 0;
-  rough_ = laws().rough();
+  has_internal_ = laws().need_internal();
   horizon_ = horizon;
   common_radius_ = common(sizes.radius);
   common_mass_ = common(sizes.mass);
@@ -103,23 +103,23 @@ void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, co
   records_.reserve(capacity_);
   radius_.clear();
   mass_.clear();
-  spins_.clear();
+  internal_.clear();
   for (const Record<D>& r : records) {
     const auto i = static_cast<Slot>(records_.size());
-    admit(i, r, sizes.radius_of(r), sizes.mass_of(r), spins.empty() ? Spin<D>(Spin<D>::Zero()) : spins[i]);
+    admit(i, r, sizes.radius_of(r), sizes.mass_of(r), internal.empty() ? Internal<D>{} : internal[i]);
   }
 }
 
 template <int D>
-void Flights<D>::admit(Slot i, const Record<D>& r, double radius, double mass, const Spin<D>& spin) {
+void Flights<D>::admit(Slot i, const Record<D>& r, double radius, double mass, const Internal<D>& internal) {
   if (i == records_.size()) {
     records_.push_back(r);
     if (common_radius_ == 0) radius_.push_back(radius);
     if (common_mass_ == 0) mass_.push_back(mass);
-    if (rough_) spins_.push_back(spin);
+    if (has_internal_) internal_.push_back(internal);
     return;
   }
-  set(i, r, spin);
+  set(i, r, internal);
   if (common_radius_ == 0) radius_[i] = radius;
   if (common_mass_ == 0) mass_[i] = mass;
 }
@@ -160,19 +160,20 @@ double Flights<D>::wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall)
 }
 
 template <int D>
-template <bool kRough>
-[[gnu::always_inline]] inline Impact<D> Flights<D>::collide_with(Slot i, Record<D>& a, Spin<D>* spin_a, Slot j,
-                                                                 Record<D>& b, Spin<D>* spin_b, const Vec<D>& shift,
-                                                                 double t, std::uint32_t generation) const {
+template <bool kInternal>
+[[gnu::always_inline]] inline EventResult<D> Flights<D>::collide_with(Slot i, Record<D>& a, Internal<D>* in_a, Slot j,
+                                                                      Record<D>& b, Internal<D>* in_b,
+                                                                      const Vec<D>& shift, double t,
+                                                                      std::uint32_t generation) const {
   advance(a, t);
   advance(b, t);
   const Vec<D> d = a.x - b.x + shift;
   const double radii = radius(i) + radius(j), sigma = grown(radii, t);
-  const Partner<D> of_a{mass(i), radius(i), a.species, spin_a}, of_b{mass(j), radius(j), b.species, spin_b};
+  const Partner<D> of_a{mass(i), radius(i), a.species, in_a}, of_b{mass(j), radius(j), b.species, in_b};
   const Vec<D> v = a.v - b.v;
   const double w = radii * growth_;
-  const PairImpulse<D> met = kRough ? pair_impulse<D>(laws(), d, v, of_a, of_b, sigma, w)
-                                    : normal_impulse<D>(laws(), d, v, of_a, of_b, sigma, w);
+  const PairImpulse<D> met = kInternal ? pair_impulse<D>(laws(), d, v, of_a, of_b, sigma, w)
+                                       : normal_impulse<D>(laws(), d, v, of_a, of_b, sigma, w);
   const Vec<D> impulse = met.on_first(d);
   if (common_mass_ == 1) {  // gives the same bits without divisions
     a.v += impulse;
@@ -186,16 +187,16 @@ template <bool kRough>
 }
 
 template <int D>
-Impact<D> Flights<D>::collide_smooth(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
-                                     std::uint32_t generation) const {
+EventResult<D> Flights<D>::collide_smooth(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
+                                          std::uint32_t generation) const {
   return collide_with<false>(i, a, nullptr, j, b, nullptr, shift, t, generation);
 }
 
 template <int D>
-Impact<D> Flights<D>::collide(Slot i, Record<D>& a, Spin<D>* spin_a, Slot j, Record<D>& b, Spin<D>* spin_b,
-                              const Vec<D>& shift, double t, std::uint32_t generation) const {
-  if (!rough_) return collide_smooth(i, a, j, b, shift, t, generation);
-  return collide_with<true>(i, a, spin_a, j, b, spin_b, shift, t, generation);
+EventResult<D> Flights<D>::collide(Slot i, Record<D>& a, Internal<D>& in_a, Slot j, Record<D>& b, Internal<D>& in_b,
+                                   const Vec<D>& shift, double t, std::uint32_t generation) const {
+  if (!has_internal_) return collide_smooth(i, a, j, b, shift, t, generation);
+  return collide_with<true>(i, a, &in_a, j, b, &in_b, shift, t, generation);
 }
 
 template <int D>
@@ -204,7 +205,7 @@ double Flights<D>::next_kick(Slot i, const Record<D>& r) const {
 }
 
 template <int D>
-Impact<D> Flights<D>::meet_alone(const EventKey<D>& key, Slot i, Record<D>& r, Spin<D>* spin) const {
+EventResult<D> Flights<D>::meet_alone(const EventKey<D>& key, Slot i, Record<D>& r, Internal<D>* internal) const {
   const double t = key.time, at_contact = grown(radius(i), t), m = mass(i);
   const Draw draw{.id = r.id, .time = box_.time + t, .number = key.generation};
   advance(r, t);
@@ -216,22 +217,23 @@ Impact<D> Flights<D>::meet_alone(const EventKey<D>& key, Slot i, Record<D>& r, S
     return {Vec<D>::Zero(), m * (r.v - before), {.heat = heat}, 0, at_contact};
   }
   const Wall<D> wall = box_.wall(key.hi);
-  const auto [after, impulse, exchange] = wall_impulse<D>(
-      laws(), wall, before, {m, at_contact, r.species, rough_ ? spin : nullptr}, draw, t, radius(i) * growth_);
+  const auto [after, impulse, exchange] =
+      wall_impulse<D>(laws(), wall, before, {m, at_contact, r.species, has_internal_ ? internal : nullptr}, draw, t,
+                      radius(i) * growth_);
   r.v = after;
   return {r.x - wall.foot(r.x, t), impulse, exchange, -wall.gap(r.x, at_contact, t) / at_contact, at_contact};
 }
 
 template <int D>
 Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
-                                  const Impact<D>& impact) const {
+                                  const EventResult<D>& impact) const {
   const auto& [d, impulse, exchange, overlap, sigma] = impact;
   if (a.id < b.id) return {key, a.x, b.x - shift, impulse, exchange, overlap, sigma, a.v, b.v};
   return {key, b.x, a.x + shift, -impulse, exchange, overlap, sigma, b.v, a.v};
 }
 
 template <int D>
-Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& r, const Impact<D>& impact) const {
+Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& r, const EventResult<D>& impact) const {
   const auto& [d, impulse, exchange, overlap, sigma] = impact;
   const Vec<D> touched = key.kind == EventKind::wall ? box_.wall(key.hi).foot(r.x, key.time) : r.x;
   return {key, r.x, touched, impulse, exchange, overlap, sigma, r.v};

@@ -21,7 +21,7 @@ namespace carom {
 
 /// The result of a collision.
 template <int D>
-struct Impact {
+struct EventResult {
   Vec<D> d;        ///< from the second centre to the first [length]
   Vec<D> impulse;  ///< impulse on the first sphere [mass·length/time]
   Exchange exchange;
@@ -40,10 +40,10 @@ class Flights {
   /// Starts a slab: all spheres at time 0, in the slots assigned before.
   void load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth);
 
-  /// Loads records of various times, in their order, with room for spheres that are admitted later. `spins`: of each,
-  /// if contacts are rough.
+  /// Loads records of various times, in their order, with room for spheres that are admitted later. `internal`: the
+  /// internal state of each, if there is one.
   void load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon,
-            std::span<const Spin<D>> spins = {});
+            std::span<const Internal<D>> internal = {});
 
   /// Frees the memory for spheres until the next load().
   void release() { PageVector<Record<D>>().swap(records_); }
@@ -53,16 +53,16 @@ class Flights {
   const Packing<D>& packing() const { return packing_; }
   const Record<D>& operator[](Slot i) const { return records_[i]; }
   std::span<const Record<D>> records() const { return records_; }
-  /// Whether contacts change spins.
-  bool rough() const { return rough_; }
-  /// The spin of a sphere, 0 if no contact is rough.
-  Spin<D> spin(Slot i) const { return rough_ ? spins_[i] : Spin<D>(Spin<D>::Zero()); }
+  /// Whether spheres have an internal state (ContactLaws::need_internal()).
+  bool has_internal() const { return has_internal_; }
+  /// The internal state of a sphere; zero if spheres have none.
+  Internal<D> internal(Slot i) const { return has_internal_ ? internal_[i] : Internal<D>{}; }
   const Vec<D>& g() const { return g_; }
   bool field() const { return field_; }
   double horizon() const { return horizon_; }
 
-  /// The radii at time t: by slot, or a single value if all are equal.
-  std::vector<double> radii(double t) const;
+  /// The reaches at time t: by slot, or a single value if all are equal.
+  std::vector<double> reaches(double t) const;
   /// The positions of all spheres at a time, by slot.
   std::vector<Vec<D>> places(double t) const {
     std::vector<Vec<D>> places;
@@ -92,28 +92,29 @@ class Flights {
   }
 
   /// Executes the collision of two spheres at time t.
-  Impact<D> collide(Slot i, Slot j, const Vec<D>& shift, double t, std::uint32_t generation) {
-    if (rough_) [[unlikely]]
-      return collide(i, records_[i], &spins_[i], j, records_[j], &spins_[j], shift, t, generation);
+  EventResult<D> collide(Slot i, Slot j, const Vec<D>& shift, double t, std::uint32_t generation) {
+    if (has_internal_) [[unlikely]]
+      return collide(i, records_[i], internal_[i], j, records_[j], internal_[j], shift, t, generation);
     return collide_smooth(i, records_[i], j, records_[j], shift, t, generation);
   }
 
-  // The functions above for records other than the present ones. Spins, which change, matter for rough contacts only.
+  // The functions above for records other than the present ones. Internal states change; they are not read if spheres
+  // have none.
   double pair_contact(Slot i, const Record<D>& a, Slot j, const Record<D>& b, const Vec<D>& shift) const;
-  Impact<D> collide(Slot i, Record<D>& a, Spin<D>* spin_a, Slot j, Record<D>& b, Spin<D>* spin_b, const Vec<D>& shift,
-                    double t, std::uint32_t generation) const;
+  EventResult<D> collide(Slot i, Record<D>& a, Internal<D>& in_a, Slot j, Record<D>& b, Internal<D>& in_b,
+                         const Vec<D>& shift, double t, std::uint32_t generation) const;
 
-  void set(Slot i, const Record<D>& r, const Spin<D>& spin) {
+  void set(Slot i, const Record<D>& r, const Internal<D>& internal) {
     records_[i] = r;
-    if (rough_) spins_[i] = spin;
+    if (has_internal_) internal_[i] = internal;
   }
   /// Stores a sphere in slot `i`, an existing one or the next.
-  void admit(Slot i, const Record<D>& r, double radius, double mass, const Spin<D>& spin);
+  void admit(Slot i, const Record<D>& r, double radius, double mass, const Internal<D>& internal);
 
   /// The contact reported to observers after a collision of two spheres, or after a lone event.
   Contact<D> contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
-                        const Impact<D>& impact) const;
-  Contact<D> contact_of(const EventKey<D>& key, const Record<D>& r, const Impact<D>& impact) const;
+                        const EventResult<D>& impact) const;
+  Contact<D> contact_of(const EventKey<D>& key, const Record<D>& r, const EventResult<D>& impact) const;
 
   // Lone events are the events of one sphere without a partner: contacts with walls and kicks by a bath.
   bool has_lone_events() const { return lone_events_; }
@@ -125,9 +126,9 @@ class Flights {
     if (kicks_) visit(next_kick(i, r), EventKind::kick, Id{0});
   }
   /// Executes a lone event; the second "centre" is the point of the wall that is touched.
-  Impact<D> meet_alone(const EventKey<D>& key, Slot i, Record<D>& r, Spin<D>* spin) const;
-  Impact<D> meet_alone(const EventKey<D>& key, Slot i) {
-    return meet_alone(key, i, records_[i], rough_ ? &spins_[i] : nullptr);
+  EventResult<D> meet_alone(const EventKey<D>& key, Slot i, Record<D>& r, Internal<D>* internal) const;
+  EventResult<D> meet_alone(const EventKey<D>& key, Slot i) {
+    return meet_alone(key, i, records_[i], has_internal_ ? &internal_[i] : nullptr);
   }
 
   /// The contact distance of two spheres at time 0; the radius of one [length].
@@ -137,12 +138,12 @@ class Flights {
   bool equal() const { return common_radius_ != 0; }
 
  private:
-  /// Plain spheres cost what they would if there were no rough ones.
-  template <bool kRough>
-  Impact<D> collide_with(Slot i, Record<D>& a, Spin<D>* spin_a, Slot j, Record<D>& b, Spin<D>* spin_b,
-                         const Vec<D>& shift, double t, std::uint32_t generation) const;
-  Impact<D> collide_smooth(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
-                           std::uint32_t generation) const;
+  /// Spheres without an internal state pay nothing for it.
+  template <bool kInternal>
+  EventResult<D> collide_with(Slot i, Record<D>& a, Internal<D>* in_a, Slot j, Record<D>& b, Internal<D>* in_b,
+                              const Vec<D>& shift, double t, std::uint32_t generation) const;
+  EventResult<D> collide_smooth(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
+                                std::uint32_t generation) const;
   void set_surroundings();
   /// The time at which a sphere touches a wall. Throws Error(Failure::numerical) if it rests there under the field.
   double wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall) const;
@@ -167,14 +168,14 @@ class Flights {
   ContactLaws elastic_;
   std::vector<Wall<D>> walls_;
   Vec<D> g_ = Vec<D>::Zero();
-  bool field_ = false, rough_ = false, kicks_ = false, lone_events_ = false;
+  bool field_ = false, has_internal_ = false, kicks_ = false, lone_events_ = false;
   double growth_ = 0, horizon_ = 0;
   GapTolerance gap_tolerance_;
   PageVector<Record<D>> records_;  // by slot
   std::size_t capacity_ = 0;       // largest number of spheres
   Packing<D> packing_;
   std::vector<double> radius_, mass_;  // by slot; empty if all are equal
-  std::vector<Spin<D>> spins_;         // by slot; empty if no contact is rough
+  std::vector<Internal<D>> internal_;  // by slot; empty if spheres have none
   double common_radius_ = 0, common_mass_ = 0;
 };
 

@@ -82,13 +82,13 @@ template <int D>
           .dissipated = 0.5 * (1 - e * e) * square / (1 / a.mass + 1 / b.mass)};
 }
 
-/// A contact of two spheres, of which rough ones change their spins.
+/// A contact of two spheres, which may change their internal states.
 template <int D>
 PairImpulse<D> pair_impulse(const ContactLaws& laws, const Vec<D>& d, const Vec<D>& v, const Partner<D>& a,
                             const Partner<D>& b, double sigma = 0, double w = 0) {
   PairImpulse<D> impulse = normal_impulse<D>(laws, d, v, a, b, sigma, w);
-  if (!a.spin) return impulse;
-  const Rubbed<D> rubbed = rub_pair<D>(laws, d, v, impulse.factor, a, b);
+  if (!a.internal) return impulse;
+  const TangentialImpulse<D> rubbed = rub_pair<D>(laws, d, v, impulse.factor, a, b);
   impulse.rough = true;
   impulse.rubbed = rubbed.impulse;
   impulse.dissipated += rubbed.dissipated;
@@ -97,16 +97,16 @@ PairImpulse<D> pair_impulse(const ContactLaws& laws, const Vec<D>& d, const Vec<
 
 /// The velocity of a sphere after a contact with a wall, and what was exchanged.
 template <int D>
-struct Bounced {
+struct WallImpulse {
   Vec<D> v, impulse;
   Exchange exchange;
 };
 
-/// A contact at time t of a sphere with velocity v with a wall, while its radius grows at `rate`. Its spin changes;
-/// `draw` matters for thermal walls only.
+/// A contact at time t of a sphere with velocity v with a wall, while its radius grows at `rate`. Its internal state
+/// may change; `draw` matters for thermal walls only.
 template <int D>
-Bounced<D> wall_impulse(const ContactLaws& laws, const Wall<D>& wall, const Vec<D>& v, const Partner<D>& a,
-                        const Draw& draw, double t = 0, double rate = 0) {
+WallImpulse<D> wall_impulse(const ContactLaws& laws, const Wall<D>& wall, const Vec<D>& v, const Partner<D>& a,
+                            const Draw& draw, double t = 0, double rate = 0) {
   if (wall.thermal()) {
     const Vec<D> after = thermal_velocity(wall, a.mass, draw, t), impulse = a.mass * (after - v);
     const double work = wall.work(impulse, t), gained = 0.5 * a.mass * (after.squaredNorm() - v.squaredNorm());
@@ -116,35 +116,45 @@ Bounced<D> wall_impulse(const ContactLaws& laws, const Wall<D>& wall, const Vec<
   const double e = laws.elastic() ? 1 : laws.of_wall(a.species, wall.number).at(closing, laws.thermal_speed, laws.slow);
   const Vec<D> after = wall.bounced(v, t, rate, e);
   const Vec<D> impulse = a.mass * (after - v);
-  Bounced<D> bounced{after,
-                     impulse,
-                     {.impulse = wall.along_normal(impulse),
-                      .work = wall.work(impulse, t),
-                      .dissipated = 0.5 * (1 - e * e) * a.mass * closing * closing}};
-  if (!a.spin) return bounced;
-  const Rubbed<D> rubbed = rub_wall<D>(laws, wall.number, wall.normal, v, closing, bounced.exchange.impulse, a);
+  WallImpulse<D> bounced{after,
+                         impulse,
+                         {.impulse = wall.along_normal(impulse),
+                          .work = wall.work(impulse, t),
+                          .dissipated = 0.5 * (1 - e * e) * a.mass * closing * closing}};
+  if (!a.internal) return bounced;
+  const TangentialImpulse<D> rubbed =
+      rub_wall<D>(laws, wall.number, wall.normal, v, closing, bounced.exchange.impulse, a);
   bounced.v += rubbed.impulse / a.mass;
   bounced.impulse += rubbed.impulse;
   bounced.exchange.dissipated += rubbed.dissipated;
   return bounced;
 }
 
-/// Resolves a contact of two of these particles, or of one and a wall, now: changes their velocities and spins, and
-/// returns the energy lost. `d`: x_lo − x_hi of the image that is touched.
+/// Resolves a contact of two of these particles, or of one and a wall, now: changes their velocities and internal
+/// states, and returns the energy lost. `d`: x_lo − x_hi of the image that is touched.
 template <int D>
 double resolve_contact(const EventKey<D>& key, const Vec<D>& d, const Box<D>& box, Particles<D>& p) {
   const Id lo = key.lo, hi = key.hi;
-  const auto partner = [&](Id i) {
-    return Partner<D>{p.mass[i], p.radius[i], p.species[i], box.contacts.rough() ? &p.spin[i] : nullptr};
+  const bool has_internal = box.contacts.need_internal();
+  Internal<D> internal[2];
+  const auto partner = [&](Id i, int which) {
+    if (has_internal) internal[which] = p.internal(i);
+    return Partner<D>{p.mass[i], p.radius[i], p.species[i], has_internal ? &internal[which] : nullptr};
+  };
+  const auto store = [&](Id i, int which) {
+    if (has_internal) p.set_internal(i, internal[which]);
   };
   if (key.kind == EventKind::wall) {
     const Draw draw{.id = p.id_of(lo), .time = box.time, .number = key.generation};
-    const auto [after, impulse, exchange] = wall_impulse<D>(box.contacts, box.wall(hi), p.v[lo], partner(lo), draw);
+    const auto [after, impulse, exchange] = wall_impulse<D>(box.contacts, box.wall(hi), p.v[lo], partner(lo, 0), draw);
     p.v[lo] = after;
+    store(lo, 0);
     return exchange.dissipated;
   }
-  const auto impulse = pair_impulse<D>(box.contacts, d, p.v[lo] - p.v[hi], partner(lo), partner(hi));
+  const auto impulse = pair_impulse<D>(box.contacts, d, p.v[lo] - p.v[hi], partner(lo, 0), partner(hi, 1));
   impulse.apply(d, p.mass[lo], p.v[lo], p.mass[hi], p.v[hi]);
+  store(lo, 0);
+  store(hi, 1);
   return impulse.dissipated;
 }
 

@@ -14,7 +14,7 @@
 
 #include <cstdint>
 
-#include "engine/base/vec.h"
+#include "engine/base/particles.h"
 #include "engine/laws/contact_law.h"
 
 namespace carom {
@@ -24,11 +24,11 @@ template <int D>
 struct Partner {
   double mass, radius;
   std::uint16_t species;
-  Spin<D>* spin = nullptr;  ///< changes in the contact; null: no contact is rough
+  Internal<D>* internal = nullptr;  ///< changes in the contact; null: spheres have none
 };
 
 template <int D>
-struct Rubbed {
+struct TangentialImpulse {
   Vec<D> impulse = Vec<D>::Zero();  ///< on the first sphere
   double dissipated = 0;            ///< energy lost
 };
@@ -36,13 +36,13 @@ struct Rubbed {
 /// A contact of two spheres with d = x_a − x_b and the relative velocity v = v_a − v_b before it; its normal impulse is
 /// factor·d.
 template <int D>
-Rubbed<D> rub_pair(const ContactLaws& laws, const Vec<D>& d, const Vec<D>& v, double factor, const Partner<D>& a,
-                   const Partner<D>& b);
+TangentialImpulse<D> rub_pair(const ContactLaws& laws, const Vec<D>& d, const Vec<D>& v, double factor,
+                              const Partner<D>& a, const Partner<D>& b);
 
 /// A contact of a sphere with velocity v and a wall, which moves along its normal only: the normal speed of approach
 /// and the normal impulse.
 template <int D>
-Rubbed<D> rub_wall(const ContactLaws& laws, std::uint32_t wall, const Vec<D>& normal, const Vec<D>& v, double closing,
-                   double pressing, const Partner<D>& a);
+TangentialImpulse<D> rub_wall(const ContactLaws& laws, std::uint32_t wall, const Vec<D>& normal, const Vec<D>& v,
+                              double closing, double pressing, const Partner<D>& a);
 
 }  // namespace carom

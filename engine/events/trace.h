@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/base/pages.h"
+#include "engine/base/particles.h"
 #include "engine/base/prefetch.h"
 #include "engine/base/record.h"
 #include "engine/laws/contact_log.h"
@@ -22,7 +23,7 @@ template <int D>
 struct Node {
   Record<D> after;
   EventKey<D> key{};
-  Spin<D> spin = Spin<D>::Zero();  ///< of the sphere after the event; 0 if no contact is rough
+  Internal<D> internal{};  ///< of the sphere after the event; zero if spheres have none; last, so that messages omit it
 
   /// The other sphere's id; kNoPartner in a lone event.
   static constexpr Id kNoPartner = std::numeric_limits<Id>::max();
@@ -36,7 +37,7 @@ struct Node {
 template <int D>
 bool operator==(const Node<D>& a, const Node<D>& b) {
   return a.key == b.key && a.after.x == b.after.x && a.after.v == b.after.v && a.after.t == b.after.t &&
-         a.after.id == b.after.id && a.spin == b.spin;
+         a.after.id == b.after.id && a.internal == b.internal;
 }
 
 /// Thrown before an event for which the log has no room; the events in the log stay valid.
@@ -68,7 +69,7 @@ class Trace {
     }
     latest_.resize(slots, 0);
     size_ = 0;
-    spins_before_.clear();
+    internal_before_.clear();
     fastest_squared_ = 0;
     most_ = kMaxEvents + kMaxEventsPerSphere * slots;
   }
@@ -87,8 +88,10 @@ class Trace {
     before_[2 * size_ + 1] = b;
     ++size_;
   }
-  /// Call after begin() if contacts are rough.
-  void note_spins(const Spin<D>& a, const Spin<D>& b) { spins_before_.insert(spins_before_.end(), {a, b}); }
+  /// Call after begin() if spheres have an internal state.
+  void note_internal(const Internal<D>& a, const Internal<D>& b) {
+    internal_before_.insert(internal_before_.end(), {a, b});
+  }
   /// Call after the event.
   void end(const Record<D>& a, const Record<D>& b, const PackedExchange& exchange, double overlap) {
     Event& event = events_[size_ - 1];
@@ -125,9 +128,9 @@ class Trace {
   const Event& event_of(std::uint32_t entry) const { return events_[entry / 2]; }
   /// The sphere's record before its entry in an event; the first sphere has the even entry.
   const Record<D>& before(std::uint32_t entry) const { return before_[entry]; }
-  /// Its spin before; 0 if none was noted.
-  Spin<D> spin_before(std::uint32_t entry) const {
-    return spins_before_.empty() ? Spin<D>(Spin<D>::Zero()) : spins_before_[entry];
+  /// Its internal state before; zero if none was noted.
+  Internal<D> internal_before(std::uint32_t entry) const {
+    return internal_before_.empty() ? Internal<D>{} : internal_before_[entry];
   }
   bool has(Slot i) const { return latest_[i] >= base_; }
   /// The entries of a sphere in order of time; valid until the next call.
@@ -151,10 +154,10 @@ class Trace {
     before_.resize(2 * events_.size());
   }
 
-  std::vector<Event> events_;          // the first size_ are used
-  PageVector<Record<D>> before_;       // by entry
-  std::vector<Spin<D>> spins_before_;  // by entry; empty if no contact is rough
-  std::vector<std::uint32_t> latest_;  // by slot: base_ + entry; smaller values are from earlier windows
+  std::vector<Event> events_;                 // the first size_ are used
+  PageVector<Record<D>> before_;              // by entry
+  std::vector<Internal<D>> internal_before_;  // by entry; empty if spheres have none
+  std::vector<std::uint32_t> latest_;         // by slot: base_ + entry; smaller values are from earlier windows
   std::uint32_t base_ = 1;
   std::size_t size_ = 0, most_ = 0;
   double fastest_squared_ = 0;

@@ -56,6 +56,8 @@ class ContactLaws {
   bool elastic() const { return laws_.empty(); }
   /// Whether any contact changes spins.
   bool rough() const { return rough_; }
+  /// Whether contacts depend on the internal state of spheres (Internal). If not, no core or message carries it.
+  bool need_internal() const { return rough_; }
   /// The reduced moment of inertia κ = 4I/mσ² = I/mr² of each species; homogeneous ones where it is 0 or missing.
   std::vector<double> inertias;
   /// κ of a homogeneous disc or sphere.

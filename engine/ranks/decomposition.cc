@@ -58,36 +58,36 @@ bool Decomposition<D>::divide(bool local, double slab_length, bool cores) {
   width_.start(cores);
   migrate(slab_length);
   next_ = kSlabsPerDivision;
-  first_ = true;
+  fresh_ = true;
   return true;
 }
 
 template <int D>
 void Decomposition<D>::to_blocks() {
-  if (!by_place_) return;
+  if (!by_place()) return;
   block();
   system_.particles = std::exchange(block_, {});
   system_.interactions = std::move(block_interactions_);
-  by_place_ = false;
+  layout_ = Layout::blocks;
 }
 
 template <int D>
 const Particles<D>& Decomposition<D>::block() {
-  if (!by_place_) return system_.particles;
+  if (!by_place()) return system_.particles;
   struct State {
     Vec<D> x, v;
     Image<D> image;
-    Spin<D> spin;
+    Internal<D> internal;
   };
-  const bool rough = system_.box.contacts.rough();
+  const bool has_internal = system_.box.contacts.need_internal();
   const Particles<D>& p = system_.particles;
-  const std::size_t size = rough ? sizeof(State) : offsetof(State, spin);
+  const std::size_t size = has_internal ? sizeof(State) : offsetof(State, internal);
   to_id_blocks(
       blocks(), *ranks_, size,
       [&](auto&& send) {
         for (Id i = 0; i < p.size(); ++i)
           if (p.owns(i)) {
-            const State state{p.x[i], p.v[i], p.image[i], rough ? p.spin[i] : Spin<D>(Spin<D>::Zero())};
+            const State state{p.x[i], p.v[i], p.image[i], has_internal ? p.internal(i) : Internal<D>{}};
             send(p.id_of(i), reinterpret_cast<const std::byte*>(&state));
           }
       },
@@ -97,7 +97,7 @@ const Particles<D>& Decomposition<D>::block() {
         block_.x[place] = state.x;
         block_.v[place] = state.v;
         block_.image[place] = state.image;
-        if (rough) block_.spin[place] = state.spin;
+        if (has_internal) block_.set_internal(static_cast<Id>(place), state.internal);
       });
   return block_;
 }
@@ -106,7 +106,7 @@ template <int D>
 Bytes Decomposition<D>::block_of(Fields::Field& field) const {
   const Particles<D>& p = system_.particles;
   const std::byte* data = field.data();
-  if (!by_place_) return {data, data + field.entries() * field.size};
+  if (!by_place()) return {data, data + field.entries() * field.size};
   Bytes block((blocks().first(ranks_->rank() + 1) - blocks().first(ranks_->rank())) * field.size);
   to_id_blocks(
       blocks(), *ranks_, field.size,
@@ -122,12 +122,12 @@ Bytes Decomposition<D>::block_of(Fields::Field& field) const {
 
 template <int D>
 bool Decomposition<D>::divide_if_due(std::int64_t slab, double slab_length) {
-  if (!by_place_) return false;
+  if (!by_place()) return false;
   const auto known = std::exchange(farthest_, {});
   const auto farthest = [&] { return std::sqrt(known ? *known : largest(squared_farthest(system_.particles.x))); };
-  const bool again = std::exchange(first_, false) && uneven();  // divide() knew no lists of pairs
-  if (!again && (all_known_ ? slab < next_ : !width_.outdated(farthest))) return false;
-  if (!all_known_ && !again) {  // the last division was good enough
+  const bool again = std::exchange(fresh_, false) && uneven();  // divide() knew no lists of pairs
+  if (!again && (knows_all() ? slab < next_ : !width_.outdated(farthest))) return false;
+  if (!knows_all() && !again) {  // the last division was good enough
     slabs_with_all_ = std::max<std::int64_t>(slabs_with_all_ / 2, 1);
     width_.relax();
   }
@@ -148,7 +148,7 @@ void Decomposition<D>::enlarge_halo(std::int64_t slab, double slab_length) {
 template <int D>
 std::vector<std::uint32_t> Decomposition<D>::work() const {
   std::vector<std::uint32_t> work(system_.particles.size(), kParticleWork);
-  if (by_place_)
+  if (by_place())
     for (const auto& term : system_.interactions) term->add_listed_pairs(work);
   return work;
 }
@@ -156,7 +156,7 @@ std::vector<std::uint32_t> Decomposition<D>::work() const {
 /// Whether a rank has much more work than the mean.
 template <int D>
 bool Decomposition<D>::uneven() const {
-  if (all_known_) return false;
+  if (knows_all()) return false;
   const std::vector<std::uint32_t> mine = work();
   std::uint64_t all = 0;
   for (Id i = 0; i < mine.size(); ++i) all += system_.particles.owns(i) ? mine[i] : 0;
@@ -179,11 +179,10 @@ std::vector<Bytes> Decomposition<D>::pack(const std::vector<std::uint64_t>& part
   std::optional<std::size_t> here;
   if (stay) here = static_cast<std::size_t>(ranks_->rank());
   std::vector<Bytes> messages = pack_own(system_.fields, p, particles, for_each_receiver, here, stay);
-  if (!by_place_) {
+  if (!by_place()) {
     block_ = std::exchange(p, {});
     block_interactions_ = std::move(system_.interactions);
     system_.interactions.clear();
-    by_place_ = true;
   }
   if (stay) return messages;
   system_.fields.resize(0);
@@ -198,7 +197,7 @@ bool Decomposition<D>::migrate_to_near(double slab_length) {
   std::array<double, 2> most{};  // reach and speed
   auto& [reach, speed] = most;
   for (const auto& term : system_.interactions)
-    reach = std::max(reach, by_place_ ? term->reach(p.x) : term->reach(p, *ranks_));
+    reach = std::max(reach, by_place() ? term->reach(p.x) : term->reach(p, *ranks_));
   std::vector<Vec<D>> own;
   std::vector<std::uint32_t> work = this->work();
   for (Id i = 0; i < p.size(); ++i) {
@@ -209,7 +208,7 @@ bool Decomposition<D>::migrate_to_near(double slab_length) {
   }
   work.resize(own.size());
   ranks_->largest(most);
-  width_.fit(reach, speed * slab_length, 2 * sizes_->largest_radius());
+  width_.fit(reach, speed * slab_length, 2 * sizes_->largest_reach());
   if (!std::isfinite(width_.far())) return false;
   const Bisection<D> bisection(system_.box, own, blocks().ranks, width_.far(), *ranks_, work);
   std::vector<std::uint64_t> known(blocks().ranks);
@@ -219,11 +218,11 @@ bool Decomposition<D>::migrate_to_near(double slab_length) {
   if (static_cast<double>(std::ranges::max(known)) > kMaxKnownFraction * static_cast<double>(total())) return false;
 
   std::vector<Fields::Arrival> stay;
-  const bool again = by_place_;  // at first the particles are in blocks, and the memory of these is freed
+  const bool again = by_place();  // at first the particles are in blocks, and the memory of these is freed
   const auto messages = ranks_->swap(pack(
       mine, [&](const Vec<D>& x, auto&& visit) { bisection.for_each_near(bisection.wrapped(x), visit); },
       again ? &stay : nullptr));
-  all_known_ = false;
+  layout_ = Layout::halos;
   receive_particles(system_.fields, system_.particles, messages, total(), std::move(stay));
   assign(bisection, width_.near());
   system_.fields.prepare_working();
@@ -234,7 +233,7 @@ template <int D>
 void Decomposition<D>::migrate_to_all() {
   const auto messages =
       ranks_->gather(pack({total() / blocks().ranks}, [](const Vec<D>&, auto&& visit) { visit(0); })[0]);
-  all_known_ = true;
+  layout_ = Layout::copies_of_all;
   receive_particles(system_.fields, system_.particles, messages, total());
   constexpr double kAll = std::numeric_limits<double>::infinity();
   Communicator alone;
@@ -266,12 +265,12 @@ void Decomposition<D>::need_paths(double path) {
 
 template <int D>
 void Decomposition<D>::start_step(std::span<Vec<D>> x, std::span<const Vec<D>> v, double length) {
-  if (!by_place_) return;
+  if (!by_place()) return;
   double farthest = 0;
   for (Id i = 0; i < v.size(); ++i)
     if (system_.particles.owns(i)) farthest = std::max(farthest, v[i].squaredNorm());
   farthest_.reset();
-  const bool look = !all_known_ && width_.looks_next();
+  const bool look = !knows_all() && width_.looks_next();
   most_ = {length * std::sqrt(farthest), look ? squared_farthest(x) : 0};
   for (const auto& term : system_.interactions) most_.push_back(term->ages() ? 1 : 0);
   halo_.start(*ranks_, most_, x);
@@ -279,10 +278,10 @@ void Decomposition<D>::start_step(std::span<Vec<D>> x, std::span<const Vec<D>> v
 
 template <int D>
 void Decomposition<D>::finish_step(std::span<Vec<D>> x) {
-  if (!by_place_) return;
+  if (!by_place()) return;
   halo_.finish(*ranks_, x);
   need_paths(most_[0]);
-  if (!all_known_ && width_.looks_next()) farthest_ = most_[1];
+  if (!knows_all() && width_.looks_next()) farthest_ = most_[1];
   for (std::size_t k = 2; k < most_.size(); ++k)
     if (most_[k] > 0) system_.interactions[k - 2]->renew();
 }
@@ -297,7 +296,8 @@ template <int D>
 void Decomposition<D>::update_halo() {
   if (knows_all()) return;
   update(std::span(system_.particles.x), std::span(system_.particles.v));
-  if (system_.box.contacts.rough()) update(std::span(system_.particles.spin));
+  if (system_.box.contacts.need_internal())
+    system_.particles.for_each_internal([&](auto& array, auto) { update(std::span(array)); });
 }
 
 template class Decomposition<2>;

@@ -96,8 +96,9 @@ class Decomposition {
   /// A field for the particles of this rank's block; with one rank, for all.
   Bytes block_of(Fields::Field& field) const;
 
-  bool by_place() const { return by_place_; }
-  bool knows_all() const { return !by_place_ || all_known_; }
+  bool by_place() const { return layout_ != Layout::blocks; }
+  /// Whether this rank has all particles, or its block.
+  bool knows_all() const { return layout_ != Layout::halos; }
   /// For work that needs all particles on one rank: throws HaloTooSmall if some are missing.
   void need_all() const {
     if (!knows_all()) throw HaloTooSmall{};
@@ -117,11 +118,11 @@ class Decomposition {
   /// Ghosts get the values of their owners; each vector has an entry for each particle of this rank.
   template <class... T>
   void update(std::span<T>... values) const {
-    if (by_place_) halo_.update(*ranks_, values...);
+    if (by_place()) halo_.update(*ranks_, values...);
   }
   /// Adds forces on ghosts to those on the particles of their owners; call when all forces of a pass have been added.
   /// Returns whether the sums of all ranks have room for more passes. Collective.
-  bool add_ghosts(ForceSums<D>& sums) const { return by_place_ ? halo_.add_ghosts(*ranks_, sums) : sums.has_room(); }
+  bool add_ghosts(ForceSums<D>& sums) const { return by_place() ? halo_.add_ghosts(*ranks_, sums) : sums.has_room(); }
   /// Ghosts get positions, velocities and spins of their owners, since some at the rim may be wrong. Does nothing if
   /// all ranks have all particles.
   void update_halo();
@@ -144,16 +145,19 @@ class Decomposition {
   Communicator* ranks_ = &alone_;
   std::optional<Sizes> sizes_;
 
-  bool by_place_ = false;
-  Particles<D> block_;  // while by_place_, only constant fields are up to date
-  std::vector<std::unique_ptr<Interaction<D>>> block_interactions_;  // for the block, while by_place_
-  bool local_ = false, all_known_ = false;
-  bool first_ = false;  // no slab has been done since divide()
+  /// What a rank has: its block; by place, its own particles and a halo; by place, all particles.
+  enum class Layout { blocks, halos, copies_of_all };
+
+  Layout layout_ = Layout::blocks;
+  Particles<D> block_;                                               // by place, only constant fields are up to date
+  std::vector<std::unique_ptr<Interaction<D>>> block_interactions_;  // for the block, by place
+  bool local_ = false;                                               // halos may be enough
+  bool fresh_ = false;                                               // no slab has been done since divide()
   HaloWidth width_;
   HaloExchange<D> halo_;
   std::optional<double> farthest_;  // the largest squared displacement at the end of the last step, if it was needed
   std::vector<double> most_;        // of a step: longest path, largest squared displacement, which terms age
-  std::int64_t next_ = 0;           // while all_known_: the slab before which to divide again
+  std::int64_t next_ = 0;           // with copies of all: the slab before which to divide again
   std::int64_t slabs_with_all_ = 1;
 };
 

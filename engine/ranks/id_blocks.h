@@ -51,7 +51,7 @@ void for_each_array(Particles<D>& p, Visit&& visit) {
   visit(p.radius);
   visit(p.charge);
   visit(p.species);
-  visit(p.spin);
+  p.for_each_internal([&](auto& array, auto) { visit(array); });
 }
 
 /// Sends the messages of all ranks to rank 0, one rank at a time, to limit its memory. Each rank calls pack() for its

@@ -41,6 +41,7 @@ void Ownership<D>::watch(double now) {
   watched_.clear();
   quiet_.clear();
   speed_.clear();
+  events_.clear();
   turned_.resize(role_.size());
   watched_at_.assign(role_.size(), kUnwatched);
   const double reach = bisection_.reach() + (kWindowsBetweenSearches + 1) * max_displacement_;
@@ -85,10 +86,10 @@ double Ownership<D>::look_at(Slot i, double now) {
 }
 
 template <int D>
-bool Ownership<D>::admit(const Record<D>& r, double now, const Spin<D>& spin) {
+bool Ownership<D>::admit(const Record<D>& r, double now, const Internal<D>& internal) {
   if (slots_.find(r.id) != IdTable::kNowhere) return true;
   Slot slot = 0;
-  if (!core_.admit(r, spin, now, slot)) return false;
+  if (!core_.admit(r, internal, now, slot)) return false;
   enlist(slot, Role::ghost);
   watch_over(slot);
   return true;

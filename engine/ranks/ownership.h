@@ -38,15 +38,15 @@ class Ownership {
   /// The neighbours that have it as a ghost: one bit for each.
   std::uint64_t holders(Slot i) const { return holders_[i]; }
   Slot slot_of(Id id) const { return slots_.find(id); }
-  bool admit(const Record<D>& r, double now, const Spin<D>& spin = Spin<D>::Zero());
+  bool admit(const Record<D>& r, double now, const Internal<D>& internal = {});
   void prefetch(Slot i) const { prefetch_line(&watched_at_[i]); }
   /// Call in a window for each event of a sphere, or `often`: for a sphere that may have had several. False for spheres
   /// far from the border, which are neither ghosts nor seen.
   bool turn(Slot i, bool often = false) {
     const std::uint32_t k = watched_at_[i];
     if (k == kUnwatched) return false;
-    if (speed_[k] >= 0) turned_[turns_++] = i;
-    speed_[k] = speed_[k] >= 0 && !often ? -speed_[k] : kOften;
+    if (events_[k] == Events::none) turned_[turns_++] = i;
+    events_[k] = events_[k] == Events::none && !often ? Events::one : Events::several;
     return true;
   }
   /// As in Subdomain, after a window of this `length` [time].
@@ -63,8 +63,8 @@ class Ownership {
  private:
   static constexpr double kWindowsBetweenSearches = 40;  // windows between searches for spheres at the border
   enum class Role : std::uint8_t { none, own, ghost };   // none: empty slot
+  enum class Events : std::uint8_t { none, one, several };
 
-  static constexpr double kOften = -std::numeric_limits<double>::infinity();
   static constexpr std::uint32_t kUnwatched = std::numeric_limits<std::uint32_t>::max();
 
   void watch_over(Slot i, double quiet = 0) {
@@ -72,6 +72,7 @@ class Ownership {
     watched_.push_back(i);
     quiet_.push_back(quiet);
     speed_.push_back(speed(i));
+    events_.push_back(Events::none);
   }
   /// How far an own sphere that is no ghost elsewhere can move before it may become one.
   double quiet_at(double depth) const { return depth - (1 + 1e-6) * bisection_.reach(); }
@@ -104,7 +105,8 @@ class Ownership {
   std::vector<std::uint64_t> holders_;     // by slot
   std::vector<Slot> watched_;              // ghosts, and own spheres that may leave or become ghosts elsewhere
   std::vector<double> quiet_;              // of each: how far it may move before it must be examined again
-  std::vector<double> speed_;              // of each: the largest until its next event; negated after it, then kOften
+  std::vector<double> speed_;              // of each: the largest until its first event since sort_out()
+  std::vector<Events> events_;             // of each: since sort_out()
   std::vector<Slot> turned_;               // spheres with events since sort_out(), each once
   std::size_t turns_ = 0;                  // their number
 };
@@ -117,8 +119,10 @@ void Ownership<D>::sort_out(double now, double length, Send&& send) {
   // The loop below subtracts its way at the speed after them.
   for (const Slot i : std::span(turned_.data(), turns_)) {
     const std::uint32_t k = watched_at_[i];
-    const double before = std::min(-speed_[k] * length, max_displacement_);
+    const double before =
+        events_[k] == Events::one ? std::min(speed_[k] * length, max_displacement_) : max_displacement_;
     speed_[k] = speed(i);
+    events_[k] = Events::none;
     quiet_[k] -= std::max(before - speed_[k] * length, 0.0);
   }
   turns_ = 0;
@@ -134,7 +138,7 @@ void Ownership<D>::sort_out(double now, double length, Send&& send) {
     if (role_[i] == Role::none) {  // the last one takes its place
       watched_at_[i] = kUnwatched;
       const auto drop = [k](auto& values) { values[k] = values.back(), values.pop_back(); };
-      drop(watched_), drop(quiet_), drop(speed_);
+      drop(watched_), drop(quiet_), drop(speed_), drop(events_);
       if (k < watched_.size()) watched_at_[watched_[k]] = static_cast<std::uint32_t>(k);
       continue;
     }

@@ -13,16 +13,16 @@ void Subdomain<D>::load(std::vector<Bytes> spheres, const Bisection<D>& bisectio
   std::size_t bytes = 0;
   for (const Bytes& message : spheres) bytes += message.size();
   std::vector<Record<D>> records;
-  std::vector<Spin<D>> spins;
+  std::vector<Internal<D>> internal;
   records.reserve(bytes / sizeof(Record<D>));
   for (Bytes& message : spheres) {
     for (Reader reader(message); reader.more();) {
       records.push_back(reader.get<Record<D>>());
-      if (box_.contacts.rough()) spins.push_back(reader.get<Spin<D>>());
+      if (box_.contacts.need_internal()) internal.push_back(reader.get<Internal<D>>());
     }
     Bytes().swap(message);
   }
-  core_.load(std::move(records), g, horizon, now, 2 * max_displacement, spins);
+  core_.load(std::move(records), g, horizon, now, 2 * max_displacement, internal);
   const auto number = static_cast<std::uint32_t>(ranks_.rank());
   ownership_.emplace(core_, bisection, number, max_displacement);
   paths_.emplace(box_, core_.flights(), *ownership_);
@@ -30,10 +30,10 @@ void Subdomain<D>::load(std::vector<Bytes> spheres, const Bisection<D>& bisectio
   end_ = now;
   length_ = 0;
   ownership_->sort_out(now, 0, [](std::size_t, const Record<D>&) {});  // all spheres near each subdomain are there
-  partners_.clear();
+  neighbours_.clear();
   if (number < bisection.subdomains())
-    for (const std::uint32_t r : bisection.neighbours(number)) partners_.push_back(static_cast<int>(r));
-  outgoing_.assign(partners_.size(), {});
+    for (const std::uint32_t r : bisection.neighbours(number)) neighbours_.push_back(static_cast<int>(r));
+  outgoing_.assign(neighbours_.size(), {});
 }
 
 template <int D>
@@ -65,8 +65,8 @@ double Subdomain<D>::run(double now, double end) {
 template <int D>
 const std::vector<Bytes>& Subdomain<D>::swap() {
   for (Bytes& read : received_) read.clear();
-  received_.resize(partners_.size());
-  received_ = ranks_.swap(std::exchange(outgoing_, std::move(received_)), partners_);
+  received_.resize(neighbours_.size());
+  received_ = ranks_.swap(std::exchange(outgoing_, std::move(received_)), neighbours_);
   return received_;
 }
 
@@ -94,14 +94,14 @@ bool Subdomain<D>::commit() {
   for (const auto& each : other) ownership_->turn(each.slot, true);
   core_.put(other, end_);
   ownership_->sort_out(end_, length_, [&](std::size_t neighbour, const Record<D>& r) {
-    put_sphere(outgoing_[neighbour], r, flights().spin(ownership_->slot_of(r.id)));
+    put_sphere(outgoing_[neighbour], r, flights().internal(ownership_->slot_of(r.id)));
   });
   bool room = true;
   for (const Bytes& bytes : swap())
     for (Reader reader(bytes); reader.more();) {
       const auto r = reader.get<Record<D>>();
-      const Spin<D> spin = flights().rough() ? reader.get<Spin<D>>() : Spin<D>(Spin<D>::Zero());
-      room = ownership_->admit(r, end_, spin) && room;
+      const auto internal = flights().has_internal() ? reader.get<Internal<D>>() : Internal<D>{};
+      room = ownership_->admit(r, end_, internal) && room;
     }
   return room;
 }

@@ -34,9 +34,9 @@ class Subdomain {
       : box_(box), ranks_(ranks), core_(box, &sizes, options) {}
 
   /// Appends a sphere to a message for load().
-  void put_sphere(Bytes& to, const Record<D>& r, const Spin<D>& spin) const {
+  void put_sphere(Bytes& to, const Record<D>& r, const Internal<D>& internal) const {
     put(to, r);
-    if (box_.contacts.rough()) put(to, spin);
+    if (box_.contacts.need_internal()) put(to, internal);
   }
   /// Starts at time `now` as the subdomain of a bisection that has this rank as number, with all spheres near it; it
   /// has none if there are fewer subdomains than ranks. In no window may a sphere move farther than
@@ -94,7 +94,7 @@ class Subdomain {
   double end_ = 0, length_ = 0;  // the present window
   std::vector<Slot> changed_;    // own spheres that are ghosts elsewhere and got new paths in the last run or repair
   std::uint64_t redone_before_ = 0;  // events of repairs before the present window
-  std::vector<int> partners_;        // ranks of the neighbours
+  std::vector<int> neighbours_;      // ranks of the neighbours
   std::vector<Bytes> outgoing_;      // for each of them
   std::vector<Bytes> received_;      // from each of them; their memory is used for the next outgoing messages
 };

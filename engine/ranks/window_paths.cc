@@ -33,10 +33,10 @@ std::vector<typename EventCore<D>::Changed> WindowPaths<D>::finish() {
   std::vector<typename EventCore<D>::Changed> other;
   for (const Slot slot : paths_.slots()) {
     const Record<D>&now = after(slot), &known = flights_[slot];
-    const Spin<D> spin = spin_after(slot);
+    const Internal<D> internal = internal_after(slot);
     if (now.t != known.t || now.x != known.x || now.v != known.v || now.generation != known.generation ||
-        spin != flights_.spin(slot))
-      other.push_back({slot, now, spin});
+        internal != flights_.internal(slot))
+      other.push_back({slot, now, internal});
   }
   paths_.clear();
   scripts_.clear();
@@ -59,7 +59,7 @@ Node<D> WindowPaths<D>::logged(Slot i, std::span<const std::uint32_t> entries, s
   const bool last = k == entries.size();
   return {.after = last ? flights_[i] : trace_.before(entries[k]),
           .key = k == 0 ? EventKey<D>{} : key_of(entries[k - 1]),
-          .spin = last ? flights_.spin(i) : trace_.spin_before(entries[k])};
+          .internal = last ? flights_.internal(i) : trace_.internal_before(entries[k])};
 }
 
 template <int D>
@@ -148,7 +148,7 @@ Contact<D> WindowPaths<D>::contact_of(Slot lo, std::size_t k) const {
   const EventKey<D> key = path.node(k).key;
   Node<D> a = path.node(k - 1);
   if (key.kind != EventKind::pair) {
-    const Impact<D> impact = flights_.meet_alone(key, lo, a.after, &a.spin);
+    const EventResult<D> impact = flights_.meet_alone(key, lo, a.after, &a.internal);
     return flights_.contact_of(key, a.after, impact);
   }
   const Slot hi = ownership_.slot_of(key.hi);
@@ -157,8 +157,8 @@ Contact<D> WindowPaths<D>::contact_of(Slot lo, std::size_t k) const {
   while (other.node(before + 1).key != key) ++before;
   Node<D> b = other.node(before);
   const Vec<D> shift = box_.shift(key.image);
-  const Impact<D> impact =
-      flights_.collide(lo, a.after, &a.spin, hi, b.after, &b.spin, shift, key.time, key.generation);
+  const EventResult<D> impact =
+      flights_.collide(lo, a.after, a.internal, hi, b.after, b.internal, shift, key.time, key.generation);
   return flights_.contact_of(key, a.after, b.after, shift, impact);
 }
 

@@ -53,7 +53,9 @@ class WindowPaths {
   Node<D> node(Slot i, std::size_t k) const { return view(i).node(k); }
   /// The sphere after its last event.
   const Record<D>& after(Slot i) const { return paths_.has(i) ? paths_.at(i).back().after : flights_[i]; }
-  Spin<D> spin_after(Slot i) const { return paths_.has(i) ? paths_.at(i).back().spin : flights_.spin(i); }
+  Internal<D> internal_after(Slot i) const {
+    return paths_.has(i) ? paths_.at(i).back().internal : flights_.internal(i);
+  }
   /// Removes all events after `last`.
   void cut(const EventKey<D>& last);
 
@@ -110,8 +112,10 @@ class WindowPaths {
     if (paths_.has(i)) return {*this, i, &paths_.at(i), {}};
     return {*this, i, nullptr, trace_.entries(i)};
   }
-  /// The bytes of a node in a message: without the spin if no contact is rough.
-  std::size_t node_bytes() const { return offsetof(Node<D>, spin) + (flights_.rough() ? sizeof(Spin<D>) : 0); }
+  /// The bytes of a node in a message: without the internal state if spheres have none.
+  std::size_t node_bytes() const {
+    return offsetof(Node<D>, internal) + (flights_.has_internal() ? sizeof(Internal<D>) : 0);
+  }
   EventKey<D> key_of(std::uint32_t entry) const;
   Node<D> logged(Slot i, std::span<const std::uint32_t> entries, std::size_t k) const;
 

@@ -183,15 +183,15 @@ void WindowRepair<D>::contact(const Task& task) {
   Node<D> of_a = paths_.path(task.a).back();
   of_a.key = key;
   if (!pair) {
-    flights_.meet_alone(key, task.a, of_a.after, &of_a.spin);
+    flights_.meet_alone(key, task.a, of_a.after, &of_a.internal);
     append(a, of_a);
     return predict(a, key);
   }
   Repaired& b = repaired_at(task.b, key);
   Node<D> of_b = paths_.path(task.b).back();
   of_b.key = key;
-  flights_.collide(task.a, of_a.after, &of_a.spin, task.b, of_b.after, &of_b.spin, box_.shift(task.image), key.time,
-                   key.generation);
+  flights_.collide(task.a, of_a.after, of_a.internal, task.b, of_b.after, of_b.internal, box_.shift(task.image),
+                   key.time, key.generation);
   append(a, of_a);
   append(b, of_b);
   predict(a, key);

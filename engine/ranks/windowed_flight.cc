@@ -25,7 +25,7 @@ WindowedFlight<D>::WindowedFlight(const Box<D>& box, Sizes sizes, Communicator& 
       ranks_(ranks),
       subdomains_(std::clamp<std::size_t>(sizes_.spheres / kMinSpheres, 1, static_cast<std::size_t>(ranks_.size()))),
       subdomain_(box, sizes_, options, ranks),
-      length_(2 * sizes_.largest_radius(), std::move(window)) {}
+      length_(2 * sizes_.largest_reach(), std::move(window)) {}
 
 template <int D>
 void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon) {
@@ -34,8 +34,8 @@ void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double ho
   events_ = 0;
   length_.start(box_, sizes_, ranks_, particles, g, horizon);
   const auto divide = [&](std::size_t subdomains) {
-    bisection_.emplace(box_, particles.x, subdomains, 2 * (sizes_.largest_radius() + length_.max_displacement()),
-                       ranks_, work_);
+    bisection_.emplace(box_, particles.x, subdomains, 2 * (sizes_.largest_reach() + length_.max_displacement()), ranks_,
+                       work_);
     for (std::uint32_t r = 0; r < subdomains; ++r)
       if (bisection_->neighbours(r).size() > kMaxNeighbours) return false;
     return true;
@@ -45,21 +45,22 @@ void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double ho
   load(0, [&](auto&& add) {
     for (Id i = 0; i < particles.size(); ++i)
       add(particles.x[i], {particles.x[i], particles.v[i], 0.0, particles.id_of(i), 0, particles.species[i]},
-          rough() ? particles.spin[i] : Spin<D>(Spin<D>::Zero()));
+          has_internal() ? particles.internal(i) : Internal<D>{});
     std::vector<Vec<D>>().swap(particles.x);
     std::vector<Vec<D>>().swap(particles.v);
   });
   run_before_ = subdomain_.counts.run_events;
 }
 
-/// Loads all subdomains. `spheres(add)` calls add(x, record, spin) for each sphere, now at x, on one of the ranks.
+/// Loads all subdomains. `spheres(add)` calls add(x, record, internal state) for each sphere, now at x, on one of the
+/// ranks.
 template <int D>
 template <class Spheres>
 void WindowedFlight<D>::load(double now, Spheres&& spheres) {
   std::vector<Bytes> outgoing(static_cast<std::size_t>(ranks_.size()));
-  spheres([&](const Vec<D>& x, const Record<D>& r, const Spin<D>& spin) {
+  spheres([&](const Vec<D>& x, const Record<D>& r, const Internal<D>& internal) {
     bisection_->for_each_near(bisection_->wrapped(x),
-                              [&](std::uint32_t rank) { subdomain_.put_sphere(outgoing[rank], r, spin); });
+                              [&](std::uint32_t rank) { subdomain_.put_sphere(outgoing[rank], r, internal); });
   });
   subdomain_.load(ranks_.swap(std::move(outgoing)), *bisection_, g_, horizon_, now, length_.max_displacement());
   now_ = now;
@@ -71,7 +72,7 @@ void WindowedFlight<D>::reload() {
   load(now_, [&](auto&& add) {
     for (const Slot i : subdomain_.own()) {
       const Record<D>& r = subdomain_.paths().after(i);
-      add(subdomain_.flights().at(r, now_).x, r, subdomain_.paths().spin_after(i));
+      add(subdomain_.flights().at(r, now_).x, r, subdomain_.paths().internal_after(i));
     }
   });
 }
@@ -202,20 +203,20 @@ void WindowedFlight<D>::fly_to(double time, Particles<D>& copies) {
   struct State {
     std::uint32_t work;
     Vec<D> x, v;
-    Spin<D> spin;
+    Internal<D> internal;
   };
   const std::size_t here = blocks().first(ranks_.rank() + 1) - blocks().first(ranks_.rank());
   copies.x.resize(here);
   copies.v.resize(here);
   work_.resize(here);
-  if (rough()) copies.spin.resize(here);
-  const std::size_t size = rough() ? sizeof(State) : offsetof(State, spin);
+  if (has_internal()) copies.resize_internal(here);
+  const std::size_t size = has_internal() ? sizeof(State) : offsetof(State, internal);
   to_id_blocks(
       blocks(), ranks_, size,
       [&](auto&& send) {
         for (const Slot i : subdomain_.own()) {
           const Record<D> r = subdomain_.flights().at(subdomain_.paths().after(i), time);
-          const State state{subdomain_work_, r.x, r.v, subdomain_.paths().spin_after(i)};
+          const State state{subdomain_work_, r.x, r.v, subdomain_.paths().internal_after(i)};
           send(r.id, reinterpret_cast<const std::byte*>(&state));
         }
       },
@@ -225,7 +226,7 @@ void WindowedFlight<D>::fly_to(double time, Particles<D>& copies) {
         copies.x[place] = state.x;
         copies.v[place] = state.v;
         work_[place] = state.work;
-        if (rough()) copies.spin[place] = state.spin;
+        if (has_internal()) copies.set_internal(static_cast<Id>(place), state.internal);
       });
 }
 

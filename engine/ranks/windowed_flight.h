@@ -47,7 +47,7 @@ class WindowedFlight {
   const WindowCounts& window_counts() const { return subdomain_.counts; }
 
  private:
-  bool rough() const { return box_.contacts.rough(); }
+  bool has_internal() const { return box_.contacts.need_internal(); }
   IdBlocks blocks() const { return {sizes_.spheres, static_cast<std::size_t>(ranks_.size())}; }
   void measure_work();
   void reload();

@@ -27,14 +27,14 @@ constexpr double kMostOscillations = 1e9;
 constexpr double kFarApart = 1e4;
 
 template <int D>
-double largest_diameter(const System<D>& system) {
+double largest_radius(const System<D>& system) {
   const auto radii = system.decomposition.radii();
-  return radii.empty() ? 0 : 2 * *std::ranges::max_element(radii);
+  return radii.empty() ? 0 : *std::ranges::max_element(radii);
 }
 
 template <int D>
 void check_spheres(const System<D>& system) {
-  const double diameter = largest_diameter(system);
+  const double diameter = 2 * reach_of(largest_radius(system));
   for (int k = 0; k < D; ++k)
     if (system.box.periodic(k) && system.box.edges[k] < diameter)
       throw Error(Failure::initial_state, "the periodic box is " + short_text(system.box.edges[k]) + " long on axis " +
@@ -305,7 +305,7 @@ void Simulation<D>::run(const Hooks& hooks) {
 template <int D>
 bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watch) {
   Decomposition<D>& decomposition = system_->decomposition;
-  const double diameter = info_.hard_cores && !system_->box.plain() ? largest_diameter(*system_) : 0;
+  const double diameter = info_.hard_cores && !system_->box.plain() ? 2 * largest_radius(*system_) : 0;
   const auto cramped = [&](double after) {
     system_->box.begin_step(slab.start, info_.stepping ? slab.length : 0);
     return diameter > 0 ? no_room(system_->box, diameter, after) : "";

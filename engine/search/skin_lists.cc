@@ -7,24 +7,24 @@ namespace carom {
 
 template <int D>
 SkinLists<D>::SkinLists(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels,
-                        std::span<const double> radius, bool equal, double largest, double skin,
+                        std::span<const double> reach, bool equal, double largest, double skin,
                         PageVector<NextEvent<D>>& next_events)
     : box_(box),
       packing_(packing),
       kernels_(kernels),
-      radius_(radius),
+      reach_(reach),
       equal_(equal),
       largest_(largest),
       skin_(skin),
       next_events_(next_events),
       lists_(packing, next_events) {
   exact_ = !equal || !box.closed();
-  if (!equal) level_.resize(radius.size());
+  if (!equal) level_.resize(reach.size());
 }
 
 template <int D>
-std::uint8_t SkinLists<D>::octave(double largest, double radius) {
-  return static_cast<std::uint8_t>(std::clamp(std::ilogb(largest / radius), 0, kOctaves - 1));
+std::uint8_t SkinLists<D>::octave(double largest, double reach) {
+  return static_cast<std::uint8_t>(std::clamp(std::ilogb(largest / reach), 0, kOctaves - 1));
 }
 
 template <int D>
@@ -34,11 +34,11 @@ void SkinLists<D>::build(std::size_t n, const std::function<Vec<D>(Slot)>& place
   levels_.clear();
   widest_ = 0;
   std::array<std::size_t, kOctaves> members{};  // by octave
-  std::array<double, kOctaves> radii{largest_};
+  std::array<double, kOctaves> largest_in{largest_};
   for (std::size_t i = 0; i < level_.size(); ++i) {
-    const std::uint8_t o = level_[i] = octave(largest_, radius_[i]);
+    const std::uint8_t o = level_[i] = octave(largest_, reach_[i]);
     ++members[o];
-    radii[o] = std::max(radii[o], radius_[i]);
+    largest_in[o] = std::max(largest_in[o], reach_[i]);
   }
   if (equal_) members[0] = n;
   std::array<std::uint8_t, kOctaves> levels{};
@@ -47,7 +47,7 @@ void SkinLists<D>::build(std::size_t n, const std::function<Vec<D>(Slot)>& place
     for (Slot i = 0; i < n; ++i) places.push_back(place(i));
   for (std::size_t o = 0; o < kOctaves; ++o) {
     if (o > 0 && members[o] == 0) continue;  // spheres admitted later go to larger ones
-    const double largest = radii[o];
+    const double largest = largest_in[o];
     levels[o] = static_cast<std::uint8_t>(levels_.size());
     const double all =
         static_cast<double>(members[o]) * static_cast<double>(extent.particles) / std::max(static_cast<double>(n), 1.0);
@@ -105,7 +105,7 @@ std::span<const std::uint32_t> SkinLists<D>::surround(Slot i, const Vec<D>& x, d
 
 template <int D>
 void SkinLists<D>::look_into(Level& level, Slot i, const Vec<D>& x, double max_displacement, unsigned& found) {
-  const auto near = level.cells.find(x, radius(i) + level.largest_radius + 2 * (skin_ + max_displacement));
+  const auto near = level.cells.find(x, reach(i) + level.largest_reach + 2 * (skin_ + max_displacement));
   const auto n = static_cast<unsigned>(near.slots.size());
   if (found_.size() < found + n + 8) found_.resize(std::size_t{2} * (found + n + 8));
   const std::int32_t carried = near.boxes;
@@ -121,7 +121,7 @@ void SkinLists<D>::look_into(Level& level, Slot i, const Vec<D>& x, double max_d
     const std::uint32_t candidate = packing_.pack(j, boxes_[j] - near.away[q] - carried);
     if (exact_) {
       const Vec<D> d = x - centre(j) + box_.shift(packing_.image(candidate));
-      const double within = radius(i) + radius(j) + 2 * (skin_ + max_displacement);
+      const double within = reach(i) + reach(j) + 2 * (skin_ + max_displacement);
       if (!(d.squaredNorm() < within * within)) continue;
     }
     found_[found] = candidate;
@@ -181,15 +181,8 @@ void SkinLists<D>::shift(Slot i, const Image<D>& boxes) {
 template <int D>
 void SkinLists<D>::follow(std::span<const Record<D>> records) {
   for (Slot i = 0; i < records.size(); ++i) {
-    Image<D> boxes{};
-    bool carried = false;
-    for (int k = 0; k < D; ++k) {
-      if (!box_.periodic(k)) continue;
-      boxes[k] = static_cast<std::int32_t>(
-          std::nearbyint((records[i].x[k] - next_events_[i].where.centre[k]) / box_.edges[k]));
-      carried = carried || boxes[k] != 0;
-    }
-    if (carried) shift(i, boxes);
+    const Image<D> boxes = box_.nearest_image(centre(i) - records[i].x);
+    if (boxes != Image<D>{}) shift(i, boxes);
   }
   const double limit = skin_ * skin_ * 0.9;
   for (Slot i = 0; i < records.size(); ++i)
@@ -197,14 +190,14 @@ void SkinLists<D>::follow(std::span<const Record<D>> records) {
 }
 
 template <int D>
-void SkinLists<D>::admit(Slot i, const Vec<D>& x, std::span<const double> radius) {
-  radius_ = radius;
+void SkinLists<D>::admit(Slot i, const Vec<D>& x, std::span<const double> reach) {
+  reach_ = reach;
   if (i == boxes_.size()) boxes_.push_back(0);
   if (!equal_) {
     if (i == level_.size()) level_.push_back(0);
     // The smallest level that can hold the sphere: its octave may have none.
     const auto level =
-        std::find_if(levels_.rbegin(), levels_.rend(), [&](const Level& l) { return l.largest_radius >= radius[i]; });
+        std::find_if(levels_.rbegin(), levels_.rend(), [&](const Level& l) { return l.largest_reach >= reach[i]; });
     level_[i] = static_cast<std::uint8_t>(levels_.rend() - level - 1);
   }
   for (int k = 0; k < D; ++k) next_events_[i].where.centre[k] = x[k];

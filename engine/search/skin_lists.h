@@ -4,7 +4,7 @@
 // their positions at the time when their lists were made. A sphere that leaves this region gets a new list, and the
 // lists of its neighbours are updated.
 //
-// The centres of the regions are stored in cells (region_cells.h); each factor of two in radius has separate cells, so
+// The centres of the regions are stored in cells (region_cells.h); each factor of two in reach has separate cells, so
 // that a small sphere does not search cells as large as the largest sphere. Lists are symmetric. (Verlet, Phys. Rev.
 // 159 (1967) 98; event-driven: Donev, Torquato, Stillinger, J. Comput. Phys. 202 (2005) 737.)
 
@@ -22,9 +22,9 @@ namespace carom {
 template <int D>
 class SkinLists {
  public:
-  /// `radius`, by slot, is the largest radius that a sphere will have; if all radii are and stay `equal`, only the
-  /// first is used. Spheres admitted later have radii of at most `largest`.
-  SkinLists(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels, std::span<const double> radius,
+  /// `reach`, by slot, is the largest reach (Sizes) that a sphere will have; if all are and stay `equal`, only the
+  /// first is used. Spheres admitted later have reaches of at most `largest`.
+  SkinLists(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels, std::span<const double> reach,
             bool equal, double largest, double skin, PageVector<NextEvent<D>>& next_events);
 
   double skin() const { return skin_; }
@@ -43,8 +43,8 @@ class SkinLists {
   /// that have left their regions.
   void follow(std::span<const Record<D>> records);
 
-  /// Adds a sphere at x in an empty slot; `radius` as in the constructor.
-  void admit(Slot i, const Vec<D>& x, std::span<const double> radius);
+  /// Adds a sphere at x in an empty slot; `reach` as in the constructor.
+  void admit(Slot i, const Vec<D>& x, std::span<const double> reach);
   /// Removes a sphere.
   void dismiss(Slot i);
   /// The sphere is now at x: renews its list if x is farther than `room` from the centre of its region; returns whether
@@ -59,19 +59,19 @@ class SkinLists {
 
  private:
   struct Level {  // spheres of similar size
-    double largest_radius;
+    double largest_reach;
     RegionCells<D> cells;
   };
 
   static constexpr int kOctaves = 31;  // the last one holds all smaller spheres
-  static std::uint8_t octave(double largest, double radius);
+  static std::uint8_t octave(double largest, double reach);
   std::size_t level_of(Slot i) const { return equal_ ? 0 : level_[i]; }
   Vec<D> centre(Slot i) const {
     Vec<D> c;
     for (int k = 0; k < D; ++k) c[k] = next_events_[i].where.centre[k];
     return c;
   }
-  double radius(Slot i) const { return radius_[equal_ ? 0 : i]; }
+  double reach(Slot i) const { return reach_[equal_ ? 0 : i]; }
   void insert(Slot i, const Vec<D>& x);
   void remove(Slot i) { levels_[level_of(i)].cells.remove(i, centre(i)); }
   void widen(std::int32_t boxes);
@@ -82,13 +82,13 @@ class SkinLists {
   Box<D> box_;
   Packing<D> packing_;
   const ScanKernels& kernels_;
-  std::span<const double> radius_;
+  std::span<const double> reach_;
   bool equal_;
   double largest_, skin_;
   PageVector<NextEvent<D>>& next_events_;
   CandidateLists<D> lists_;
   std::vector<Level> levels_;
-  std::vector<std::uint8_t> level_;  // by slot; empty if all radii are equal
+  std::vector<std::uint8_t> level_;  // by slot; empty if all reaches are equal
   PageVector<std::int32_t> boxes_;   // by slot: the box of the region's centre, as a linear image
 
   std::vector<std::uint32_t> found_, fresh_;

@@ -12,9 +12,9 @@ namespace carom {
 
 namespace {
 
-// Rounds of impulses at one instant: an impact on a row of n spheres takes n rounds, a light sphere between two heavy
-// ones π √(M/m), which is 3000 for masses of 1 : 10⁶ (Galperin, Regul. Chaotic Dyn. 8 (2003) 375).
-constexpr std::uint32_t kMostRounds = 30000;
+// Generations of impulses at one instant: an impact on a row of n spheres takes n generations, a light sphere between
+// two heavy ones π √(M/m), which is 3000 for masses of 1 : 10⁶ (Galperin, Regul. Chaotic Dyn. 8 (2003) 375).
+constexpr std::uint32_t kMostGenerations = 30000;
 constexpr double kMostCorrection = 1e-6 / kRounding;  // of an overlap, relative to the rounding of the speeds
 
 }  // namespace
@@ -26,7 +26,7 @@ ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events, s
       walls_(system.box.walls()),
       walls_at_(system.box.time),
       tolerance_(system.box.gap_tolerance()),
-      list_(system.box, system.particles.radius, {}, system.particles.all_fixed()),
+      list_(system.box, reaches_of(system.particles.radius), {}, system.particles.all_fixed()),
       keeps_momentum_(system.keeps_momentum()),
       max_events_(max_events),
       reactions_(reactions),
@@ -157,7 +157,8 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v, const 
   double lost = 0;
   for (std::uint32_t generation = 0;; ++generation) {
     one_by_one(generation, x, v, impulse);
-    // Inelastic impacts in a cluster go on without end, ever slower; after some rounds the rest of the approach stops.
+    // Inelastic impacts in a cluster go on without end, ever slower; after some generations the rest of the approach
+    // stops.
     const bool all_stop = generation >= kMostBounces;
     sort_out(v, all_stop);
     if (!approaching_.empty()) continue;
@@ -187,15 +188,15 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v, const 
   return lost;
 }
 
-/// One round of impulses, in key order.
+/// One generation of impulses, in key order.
 template <int D>
 void ContactScan<D>::one_by_one(std::uint32_t generation, Positions<D> x, Vectors<D> v,
                                 const ApplyImpulse<D>& impulse) {
   for (Touch<D>& touch : approaching_) {
-    // An earlier impulse of this round may have separated the spheres.
+    // An earlier impulse of this generation may have separated the spheres.
     if (!(normal_speed(touch, v) < -stopping_speed(touch, v))) continue;
     touch.key.generation = generation;
-    if (generation > kMostRounds)
+    if (generation > kMostGenerations)
       throw Error(Failure::numerical, partners(touch.key, box_) +
                                           " and their neighbours collide without end at one instant: they touch on all "
                                           "sides and have no room to part; leave gaps between spheres that fill the "

@@ -371,8 +371,8 @@ template <int D>
 typename SlabCore<D>::Flight& SlabCore<D>::flight(Id i, const EventKey<D>& key) {
   const Vec<D> x = position(i, key.time), v = velocity(i, key.time);
   if (slot_[i] == 0) {
-    flights_.push_back({x, v, key.time, i, 0, 0, 0, Spin<D>::Zero()});
-    if (box_.contacts.rough()) flights_.back().spin = particles_.spin[i];
+    flights_.push_back(
+        {x, v, key.time, i, 0, 0, 0, box_.contacts.need_internal() ? particles_.internal(i) : Internal<D>{}});
     slot_[i] = static_cast<std::uint32_t>(flights_.size());
   }
   Flight& f = flights_[slot_[i] - 1];
@@ -397,7 +397,7 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
   Contact<D> contact{key, lo.x, lo.x, Vec<D>::Zero()};
   const auto partner = [&](Flight& f) {
     return Partner<D>{particles_.mass[f.id], particles_.radius[f.id], particles_.species[f.id],
-                      box_.contacts.rough() ? &f.spin : nullptr};
+                      box_.contacts.need_internal() ? &f.internal : nullptr};
   };
   const auto checks_path = [&](const Flight& f) {
     const double far = (f.x - particles_.x[f.id]).norm() + path(f.v, acceleration(f.id), length_ - f.t);

@@ -85,8 +85,8 @@ class SlabCore {
   void finish(Particles<D>& particles) {
     particles.x.swap(x_);
     particles.v.swap(v_);
-    if (box_.contacts.rough())
-      for (const Flight& each : flights_) particles.spin[each.id] = each.spin;
+    if (box_.contacts.need_internal())
+      for (const Flight& each : flights_) particles.set_internal(each.id, each.internal);
     system_.box.time += length_;
   }
 
@@ -100,8 +100,8 @@ class SlabCore {
     double t;
     Id id;
     std::uint32_t version, generation;
-    std::uint64_t hash;  ///< hash of the particle's sequence of partners
-    Spin<D> spin;        ///< if contacts are rough
+    std::uint64_t hash;    ///< hash of the particle's sequence of partners
+    Internal<D> internal;  ///< if spheres have one
   };
   struct Planned {
     EventKey<D> key;

@@ -32,6 +32,7 @@ const std::vector<double>* pair_factors(PairWeight weight, const Particles<D>& p
 }
 
 template <int D, Potential P, class Pairs>
+requires PairSource<Pairs, D>
 class PairTerm final : public Interaction<D> {
  public:
   /// `particles` marks ghosts and must outlive the term. `scale`: for pairs of weight 1 at a given distance.
@@ -81,14 +82,14 @@ class PairTerm final : public Interaction<D> {
     evaluate({.x = x}, &forces, sums, 1, &arrive);
   }
   bool ages() const override {
-    if constexpr (requires { pairs_.ages(); }) return pairs_.ages();
+    if constexpr (kListed) return pairs_.ages();
     return false;
   }
   void renew() const override {
-    if constexpr (requires { pairs_.renew(); }) pairs_.renew();
+    if constexpr (kListed) pairs_.renew();
   }
   void add_listed_pairs(std::span<std::uint32_t> of_particle) const override {
-    if constexpr (requires { pairs_.add_listed_pairs(of_particle); }) pairs_.add_listed_pairs(of_particle);
+    if constexpr (kListed) pairs_.add_listed_pairs(of_particle);
   }
   std::uint64_t add_mean_forces(Positions<D> x, Positions<D> x_new, ForceSums<D>& forces, const char* changed,
                                 int sign) const override {
@@ -107,11 +108,8 @@ class PairTerm final : public Interaction<D> {
     return term;
   }
   bool regroup() override {
-    if constexpr (requires { pairs_.regroup(); }) {
-      pairs_.regroup();
-      return true;
-    }
-    return false;
+    if constexpr (kListed) pairs_.regroup();
+    return kListed;
   }
   void use(const PairKernels& kernels) override {
     kernels_ = &kernels;
@@ -119,7 +117,7 @@ class PairTerm final : public Interaction<D> {
   }
   Tail tail() const override { return tail_; }
   const PairList* bonds() const override {
-    if constexpr (requires { pairs_.list(); })
+    if constexpr (std::same_as<Pairs, Bonds<D>>)
       return &pairs_.list();
     else
       return nullptr;
@@ -148,6 +146,8 @@ class PairTerm final : public Interaction<D> {
   }
 
  private:
+  static constexpr bool kListed = ListedPairs<Pairs, D>;
+
   /// The formula from the kernels if the potential is listed; else compiled here, two lanes wide.
   const PairFormula& formula() const {
     constexpr std::size_t place = place_of<P>(PairPotentials{});
@@ -173,7 +173,7 @@ class PairTerm final : public Interaction<D> {
   };
   /// Calls add(particle, weight, images) for each own particle that meets its images.
   void add_own_images(auto&& add) const {
-    if constexpr (requires { pairs_.takes_images_of(0); }) {
+    if constexpr (PairsWithImages<Pairs, D>) {
       OwnImages images;
       pairs_.for_each_own_image([&](const Vec<D>& d) {
         const double rho = d.squaredNorm();
@@ -228,7 +228,7 @@ class PairTerm final : public Interaction<D> {
     };
     const PairStep<D> all = step(given);
     bool done = false;
-    if constexpr (requires { pairs_.own_batches(all, particles_, cutoff_squared(), *batch_, add_batch); })
+    if constexpr (kListed)
       if (arrive && pairs_.own_batches(all, particles_, cutoff_squared(), *batch_, add_batch)) {
         (*arrive)();
         pairs_.rest_batches(all, particles_, cutoff_squared(), *batch_, add_batch, [&] {

@@ -1,30 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Sources of pairs for the sum of a term of V: a list of bonds, all pairs, or the pairs within a cutoff.
-//
-// Each source has
-//   batches(step, particles, cutoff², batch, visit)   fills the batch repeatedly and calls visit(): with pairs of own
-//                               particles, and those pairs with a ghost that this rank evaluates
-//   id(place)                   the particle with this number in a batch
-//   low(sums), high(sums)       words to which the forces of a batch are added; flush_to(sums) comes last
-//   most_partners()             upper bound for any particle in these batches
-//   use(kernels)                replaces the widest kernels of this machine
-//   own_batches(…)              if it exists: as batches() for pairs of own particles, where the positions of ghosts
-//                               are unknown; returns false if that is not possible. Then rest_batches(…, before_new)
-//                               for the rest; before_new() is called if sums must be flushed before new batches
-//   ages(), renew(), add_listed_pairs(…)
-//                               if they exist: as in Interaction
-//   regroup()                   if it exists: the particles have been replaced by others
-//   for_each_own_image(visit), takes_images_of(i)
-//                               if they exist: visits the separations of any particle from its own images within reach,
-//                               one of ±d; and whether a particle and its images are pairs of this source
-// and
-//   reach(x), reach(block, ranks)           largest distance of partners; infinite: unlimited
-//   among(some)                             the source for a subset of the particles, or nothing if partners are
-//   missing
+// PairSource lists what each source has. A source with lists, and one whose particles meet their own images, have more:
+// ListedPairs, PairsWithImages.
 
 #include <algorithm>
 #include <cmath>
+#include <concepts>
 #include <functional>
 #include <limits>
 #include <numeric>
@@ -39,6 +21,46 @@
 #include "engine/ranks/communicator.h"
 
 namespace carom {
+
+template <class S, int D>
+concept PairSource = requires(const S& source, S& changing, Positions<D> x, const PairStep<D>& step, ForceSums<D>& sums,
+                              const Particles<D>& particles, Communicator& ranks, PairBatch& batch, void (*visit)(),
+                              const PairKernels& kernels) {
+  // Fills the batch repeatedly and calls visit(): with pairs of own particles, and with the pairs with a ghost that
+  // this rank evaluates.
+  source.batches(step, particles, 1.0, batch, visit);
+  { source.id(0u) } -> std::same_as<Id>;                    // the particle with this number in a batch
+  source.low(sums), source.high(sums);                      // words to which the forces of a batch are added
+  source.flush_to(sums);                                    // comes after all forces
+  { source.most_partners() } -> std::same_as<std::size_t>;  // upper bound for any particle in these batches
+  changing.use(kernels);                                    // replaces the widest kernels of this machine
+  // The largest distance of partners; infinite: unlimited.
+  { source.reach(x) } -> std::same_as<double>;
+  { source.reach(particles, ranks) } -> std::same_as<double>;
+  { source.among(particles) } -> std::same_as<std::optional<S>>;  // for a subset; nothing if partners are missing
+};
+
+/// A source with a list of pairs, which ages.
+template <class S, int D>
+concept ListedPairs = PairSource<S, D> &&
+    requires(const S& source, S& changing, const PairStep<D>& step, const Particles<D>& particles, PairBatch& batch,
+             void (*visit)(), std::function<void()> before_new, std::span<std::uint32_t> of_particle) {
+  // As batches() for pairs of own particles, where the positions of ghosts are unknown; false if that is impossible.
+  { source.own_batches(step, particles, 1.0, batch, visit) } -> std::same_as<bool>;
+  // The rest of the pairs; before_new() is called if sums must be flushed before new batches.
+  source.rest_batches(step, particles, 1.0, batch, visit, before_new);
+  { source.ages() } -> std::same_as<bool>;  // this and the next two as in Interaction
+  source.renew();
+  source.add_listed_pairs(of_particle);
+  changing.regroup();  // the particles have been replaced by others
+};
+
+/// A source whose particles may be partners of their own images.
+template <class S, int D>
+concept PairsWithImages = PairSource<S, D> && requires(const S& source, void (*visit)(const Vec<D>&)) {
+  source.for_each_own_image(visit);  // the separations of any particle from its own images within reach, one of ±d
+  { source.takes_images_of(Id{}) } -> std::same_as<bool>;  // whether a particle and its images are pairs of this source
+};
 
 /// Fills the batch from each part of a list in turn, from the kinds of pairs of own particles, shared ones, or both.
 template <int D, class Visit>
@@ -322,5 +344,9 @@ class PairsWithinCutoff {
   mutable CutoffList<D> list_;
   mutable PairRecords<D>* records_ = nullptr;
 };
+
+static_assert(PairSource<Bonds<3>, 3> && !ListedPairs<Bonds<3>, 3>);
+static_assert(PairSource<AllPairs<3>, 3> && !ListedPairs<AllPairs<3>, 3>);
+static_assert(ListedPairs<PairsWithinCutoff<3>, 3> && PairsWithImages<PairsWithinCutoff<3>, 3>);
 
 }  // namespace carom

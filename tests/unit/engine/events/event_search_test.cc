@@ -175,7 +175,7 @@ TEST(EventSearch, FindsContactsInScatteredParts) {
         const Vec<3> last = s.flights.at(members.back().second, now).x + Vec<3>(3 * cell, 0, 0);
         for (const auto& [i, away] : {std::pair(members.back().second, 0.0), {members.end()[-2].second, 1.5}}) {
           const Record<3> r = s.flights.at(i, now);
-          s.flights.set(i, {last - Vec<3>(away, 0.3, 0), {away, 0, 0.1}, now, r.id, 0, r.species}, Spin<3>::Zero());
+          s.flights.set(i, {last - Vec<3>(away, 0.3, 0), {away, 0, 0.1}, now, r.id, 0, r.species}, {});
           s.search.move(i, now);
         }
       }
@@ -202,7 +202,7 @@ TEST(EventSearch, KnowsSpheresThatComeMoveAndGo) {
     };
     const Vec<3> x = s.flights.at(3, now).x, other = s.flights.at(40, now).x;
     for (const auto& [i, at] : {std::pair<Slot, Vec<3>>{3, other}, {40, x}}) {  // they exchange positions
-      s.flights.set(i, {at, -2.0 * s.flights[i].v, now, s.flights[i].id, 0, s.flights[i].species}, Spin<3>::Zero());
+      s.flights.set(i, {at, -2.0 * s.flights[i].v, now, s.flights[i].id, 0, s.flights[i].species}, {});
       s.search.move(i, now);
     }
     plan_all();
@@ -227,7 +227,7 @@ TEST(EventSearch, FindsAllThatASphereMayTouchInAWindow) {
       for (Slot i = 0; i < s.flights.size(); ++i) {
         const auto near = s.search.find_near(i);
         s.for_all_others(i, [&](Slot j, const Image<3>& image) {
-          const double reach = s.flights.radii(0)[i] + s.flights.radii(0)[j] + 2 * displacement;
+          const double reach = s.flights.reaches(0)[i] + s.flights.reaches(0)[j] + 2 * displacement;
           if ((s.flights[i].x - s.flights[j].x + s.system->box.shift(image)).norm() > reach) return;
           const auto& packing = s.flights.packing();
           EXPECT_TRUE(std::ranges::count(near, packing.pack(j, packing.linear(image))) == 1) << i << ' ' << j;

@@ -26,7 +26,7 @@ std::unique_ptr<Subdomain<D>> subdomain_of(const System<D>& system, const Sizes&
   std::vector<Bytes> spheres(1);
   for (const Record<D>& r : records_of(system.particles))
     if (number < bisection.subdomains() && bisection.near(number, bisection.wrapped(r.x)))
-      subdomain->put_sphere(spheres[0], r, Spin<D>::Zero());
+      subdomain->put_sphere(spheres[0], r, Internal<D>{});
   subdomain->load(std::move(spheres), bisection, Vec<D>::Zero(), end, 0, kDisplacement);
   return subdomain;
 }
