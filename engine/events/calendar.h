@@ -113,7 +113,8 @@ class Calendar {
     CalendarEntry entry[kChunk];
   };
   struct Bin {
-    std::uint32_t chunk = kNoChunk;  // the last chunk; between calls it is not full
+    std::uint32_t chunk =
+        kNoChunk;  // the chunk that was added last; it may be full, and then append() adds another one
     std::uint32_t count = 0;
   };
 

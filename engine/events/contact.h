@@ -8,7 +8,7 @@
 //
 //   const double s = contact_time(d, v, sigma, slack);            // straight flights
 //   const double s = contact_time(d, v, sigma, w, slack);         // straight flights of spheres that grow
-//   const double s = contact_time(d, v, a, sigma, rest, slack);   // parabolas, sought in [0, rest)
+//   const double s = contact_time(d, v, a, sigma, time_left, slack);   // parabolas, sought in [0, time_left)
 //
 // For touching pairs, an approach slower than `slack` (the rounding of velocities, see approach_slack) does not count:
 // no impulse could change it, so the contact would repeat without end.
@@ -67,15 +67,15 @@ double contact_time(const Vec<D>& d, const Vec<D>& v, double sigma, double w, do
   return b < 0 ? c / (root - b) : (b + root) / -outrun;  // the form of the root without cancellation
 }
 
-/// Parabolic relative motion d + v s + a s²/2, with s in [0, rest). `touching` divides out the root s = 0 of a pair in
-/// contact. The time is 0 for a touching pair that approaches, and for one at rest that is pressed together.
+/// Parabolic relative motion d + v s + a s²/2, with s in [0, time_left). `touching` divides out the root s = 0 of a
+/// pair in contact. The time is 0 for a touching pair that approaches, and for one at rest that is pressed together.
 template <int D>
-double contact_time(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double sigma, double rest, bool touching,
+double contact_time(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double sigma, double time_left, bool touching,
                     double slack) {
   const double c0 = d.squaredNorm() - sigma * sigma;
   const double b = d.dot(v);
   if (!touching) {  // most pairs are too far apart: compare the distance with the path length
-    const double path = rest * (v.norm() + 0.5 * rest * a.norm());
+    const double path = time_left * (v.norm() + 0.5 * time_left * a.norm());
     if (c0 > 0 && path * (path + 2 * sigma) < c0) return kNever;
   }
   const Polynomial<4> gap{{c0, 2 * b, v.squaredNorm() + d.dot(a), v.dot(a), 0.25 * a.squaredNorm()}};
@@ -83,9 +83,9 @@ double contact_time(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double si
   if (touching) {
     if (b < -slack) return 0;
     const double departing = b <= slack ? 0.0 : 2 * b;
-    s = first_fall(Polynomial<3>{{departing, gap.c[2], gap.c[3], gap.c[4]}}, rest);
+    s = first_fall(Polynomial<3>{{departing, gap.c[2], gap.c[3], gap.c[4]}}, time_left);
   } else {
-    s = first_fall(gap, rest);
+    s = first_fall(gap, time_left);
   }
   if (s == 0 || s == kNever) return s;
   const Vec<D> at = d + s * v + (0.5 * s * s) * a;  // a Newton step on the vectors themselves
@@ -94,32 +94,32 @@ double contact_time(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double si
     const double correction = 0.5 * (at.squaredNorm() - sigma * sigma) / falling;
     if (std::abs(correction) < 1e-6 * s) s -= correction;
   }
-  return s < rest ? s : kNever;
+  return s < time_left ? s : kNever;
 }
 
-/// A sphere and a wall: gap + v s + a s²/2, v and a along the wall's inward normal, s in [0, rest).
-inline double wall_contact_time(double gap, double v, double a, double rest, bool touching, double slack) {
+/// A sphere and a wall: gap + v s + a s²/2, v and a along the wall's inward normal, s in [0, time_left).
+inline double wall_contact_time(double gap, double v, double a, double time_left, bool touching, double slack) {
   if (!(gap < kNever)) return kNever;
   if (touching) {
     if (v < -slack) return 0;
     if (a >= 0) return kNever;
     const double s = v <= slack ? 0.0 : -2 * v / a;
-    return s < rest ? s : kNever;
+    return s < time_left ? s : kNever;
   }
   if (a == 0) {
     const double s = v < 0 ? gap / -v : kNever;
-    return s < rest ? s : kNever;
+    return s < time_left ? s : kNever;
   }
-  return first_fall(Polynomial<2>{{gap, v, 0.5 * a}}, rest);
+  return first_fall(Polynomial<2>{{gap, v, 0.5 * a}}, time_left);
 }
 
 /// A sphere that is not wholly in front of a one-way wall: the time at which it comes back after it has passed.
 /// `clearance` < 0 is the distance of its surface from the plane, v and a as above.
-inline double return_time(double clearance, double v, double a, double rest) {
+inline double return_time(double clearance, double v, double a, double time_left) {
   const double discriminant = v * v - 2 * a * clearance;
   if (v <= 0 || a >= 0 || discriminant <= 0) return kNever;
   const double s = (v + std::sqrt(discriminant)) / -a;
-  return s < rest ? s : kNever;
+  return s < time_left ? s : kNever;
 }
 
 }  // namespace carom

@@ -43,7 +43,7 @@ void EventCore<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon
 template <int D>
 void EventCore<D>::give_back(double time, Particles<D>& particles) {
   queue_.empty();  // frees memory
-  fly_to(time, particles);
+  copy_at(time, particles);
 }
 
 /// Loads the records, sorted in space again if that is due.
@@ -158,7 +158,7 @@ double EventCore<D>::run(double end, const Report& report) {
 }
 
 template <int D>
-void EventCore<D>::fly_to(double time, Particles<D>& copies) const {
+void EventCore<D>::copy_at(double time, Particles<D>& copies) const {
   copies.x.resize(flights_.size());
   copies.v.resize(flights_.size());
   for (Slot i = 0; i < flights_.size(); ++i) {
@@ -186,17 +186,17 @@ void EventCore<D>::collide_pair(Slot i, Slot j, std::uint32_t partner, double ti
   const Packing<D>& packing = flights_.packing();
   if (report.trace) begin_trace(i, partner, generation, *report.trace);
   const Vec<D> shift = packing.linear(partner) != 0 ? box_.shift(packing.image(partner)) : Vec<D>(Vec<D>::Zero());
-  const EventResult<D> impact = flights_.collide(i, j, shift, time, generation);
+  const EventResult<D> result = flights_.collide(i, j, shift, time, generation);
   ++queue_[i].version;
   ++queue_[j].version;
   if (report.trace)
-    return report.trace->end(flights_[i], flights_[j], {EventKind::pair, impact.exchange}, impact.overlap);
-  report.counters.add_pair(impact.exchange);
+    return report.trace->end(flights_[i], flights_[j], {EventKind::pair, result.exchange}, result.overlap);
+  report.counters.add_pair(result.exchange);
   const auto key = [&] {
     return pair_key<D>(time, generation, flights_[i].id, flights_[j].id, packing.image(partner));
   };
-  report.counters.note_overlap(impact.overlap, [&] { return Overlap(impact.overlap, impact.sigma, key()); });
-  if (report.contacts) report.contacts->push_back(flights_.contact_of(key(), flights_[i], flights_[j], shift, impact));
+  report.counters.note_overlap(result.overlap, [&] { return Overlap(result.overlap, result.sigma, key()); });
+  if (report.contacts) report.contacts->push_back(flights_.contact_of(key(), flights_[i], flights_[j], shift, result));
 }
 
 template <int D>
@@ -206,12 +206,12 @@ void EventCore<D>::meet_alone(Slot i, std::uint32_t generation, const Report& re
     report.trace->begin(key.kind, i, flights_[i], Trace<D>::kNoEntry, flights_[i], key.hi, generation);
     if (flights_.has_internal()) report.trace->note_internal(flights_.internal(i), flights_.internal(i));
   }
-  const EventResult<D> impact = flights_.meet_alone(key, i);
+  const EventResult<D> result = flights_.meet_alone(key, i);
   ++queue_[i].version;
-  if (report.trace) return report.trace->end(flights_[i], flights_[i], {key.kind, impact.exchange}, impact.overlap);
-  report.counters.add(key.kind, key.hi, impact.exchange);
-  report.counters.note_overlap(impact.overlap, [&] { return Overlap(impact.overlap, impact.sigma, key); });
-  if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], impact));
+  if (report.trace) return report.trace->end(flights_[i], flights_[i], {key.kind, result.exchange}, result.overlap);
+  report.counters.add(key.kind, key.hi, result.exchange);
+  report.counters.note_overlap(result.overlap, [&] { return Overlap(result.overlap, result.sigma, key); });
+  if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], result));
 }
 
 template class EventCore<2>;

@@ -12,10 +12,10 @@
 // All spheres may grow by a common factor (engine/setup/compression.h): contact distances and distances from walls are
 // then functions of time, like positions.
 //
-//   EventCore<3> core(box, particles);
+//   EventCore<3> core(box);
 //   core.load(particles, g, horizon);             // all spheres at time 0
 //   core.run(end, report);                        // executes events with time < end
-//   core.fly_to(end, particles);                  // copies, advanced to `end`
+//   core.copy_at(end, particles);                 // copies, advanced to `end`
 
 #include "engine/events/event_search.h"
 #include "engine/events/trace.h"
@@ -30,15 +30,15 @@ class EventCore {
   struct Report {
     Counters& counters;
     std::vector<Contact<D>>* contacts = nullptr;
-    std::uint64_t collision_limit = std::numeric_limits<std::uint64_t>::max();  ///< largest counters.sphere_sphere
-    std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max();       ///< most contacts since load()
-    std::uint64_t contact_limit = std::numeric_limits<std::uint64_t>::max();    ///< contacts since load(): run() ends
+    std::uint64_t collision_limit =
+        std::numeric_limits<std::uint64_t>::max();                            ///< run() ends at counters.sphere_sphere
+    std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max();     ///< more contacts since load(): Error
+    std::uint64_t contact_limit = std::numeric_limits<std::uint64_t>::max();  ///< contacts since load(): run() ends
     Trace<D>* trace = nullptr;  ///< records paths if given; contacts are then not counted, because they may be revoked
   };
 
-  /// The core reads masses and radii from `particles` at the start of each slab.
-  EventCore(const Box<D>& box, const Particles<D>& /*particles*/, const SearchOptions& options = {})
-      : EventCore(box, nullptr, options) {}
+  /// load() and take() read masses and radii from the particles that they get.
+  explicit EventCore(const Box<D>& box, const SearchOptions& options = {}) : EventCore(box, nullptr, options) {}
   /// A core for part of a larger system; `sizes` has the masses and radii of the whole system and must outlive the
   /// core.
   EventCore(const Box<D>& box, const Sizes* sizes, const SearchOptions& options);
@@ -65,7 +65,7 @@ class EventCore {
   double now() const { return now_; }
 
   /// Copies all spheres, advanced to `time`. No event before `time` may be pending.
-  void fly_to(double time, Particles<D>& copies) const;
+  void copy_at(double time, Particles<D>& copies) const;
 
   /// Counts since the core was constructed.
   EventCounts counts() const;

@@ -42,7 +42,8 @@ EventKey<D> EventQueue<D>::key_of(Slot i) const {
 template <int D>
 void EventQueue<D>::offer(Slot i, double time, EventKind kind, std::uint32_t partner) {
   NextEvent<D>& a = next_events_[i];
-  if (!(time <= a.contact) || time == kNever) return;  // no number: the next look at the energy ends the run
+  if (!(time <= a.contact) || time == kNever)
+    return;  // A time that is NaN is ignored here; the monitor ends the run when it next checks the energy.
   const NextEvent<D> before = a;
   const EventKey<D> rival = time == a.contact ? key_of(i) : EventKey<D>{};
   a.contact = time;
@@ -68,14 +69,15 @@ bool EventQueue<D>::mirrored(Slot i, Slot j) const {
          !stale(a) && !stale(b);
 }
 
-/// Whether an event, which is not the only one at this time, is the only one but for its partner's; otherwise begins to
-/// order them.
+/// Called if several entries have this time. If the only other one is the partner's entry for the same contact, this
+/// function removes that entry and returns true. Otherwise it puts the events into tied_, from which next_tied() takes
+/// them in the order of their keys, and returns false.
 template <int D>
-bool EventQueue<D>::alone(Slot slot, double time) {
+bool EventQueue<D>::serve_alone(Slot slot, double time) {
   read_versions();  // stale plans must be recognised from here on
   // Often both partners planned the same contact: both plans are then served at once.
   Slot other = slot;
-  if (const CalendarEntry* const next = calendar_.top(Holds{next_events_.data()}); mirrored(slot, next->slot)) {
+  if (const CalendarEntry* const next = calendar_.top(IsValid{next_events_.data()}); mirrored(slot, next->slot)) {
     other = next->slot;
     calendar_.pop();
     if (!calendar_.more_at(time)) return true;
@@ -86,16 +88,16 @@ bool EventQueue<D>::alone(Slot slot, double time) {
   return false;
 }
 
-/// next() while several events at the same time are in order.
+/// next() while several events at the same time are being put in order.
 template <int D>
 bool EventQueue<D>::next_tied(double end, Slot& slot, double& time) {
-  const Holds holds{next_events_.data()};
+  const IsValid is_valid{next_events_.data()};
   while (!tied_.empty()) {
     read_versions();
     time = tied_time_;
     while (calendar_.more_at(time)) {
-      const CalendarEntry* const top = calendar_.top(holds);
-      if (holds(*top)) tied_.push(tie(top->slot));
+      const CalendarEntry* const top = calendar_.top(is_valid);
+      if (is_valid(*top)) tied_.push(tie(top->slot));
       calendar_.pop();
     }
     const Tied first = tied_.top();

@@ -67,14 +67,14 @@ class EventQueue {
   /// Removes and returns the next event before `end`; false if there is none.
   [[gnu::always_inline]] bool next(double end, Slot& slot, double& time) {
     while (tied_.empty()) {
-      const CalendarEntry* const top = calendar_.top(Holds{next_events_.data()});
+      const CalendarEntry* const top = calendar_.top(IsValid{next_events_.data()});
       if (!top || top->time >= end) return false;
       slot = top->slot;
       time = top->time;
       calendar_.pop();
       if (next_events_[slot].due() != time)
         ++counts_.dropped;
-      else if (!calendar_.more_at(time) || alone(slot, time))
+      else if (!calendar_.more_at(time) || serve_alone(slot, time))
         return true;
     }
     return next_tied(end, slot, time);
@@ -108,12 +108,12 @@ class EventQueue {
   };
 
   /// Whether an entry of the calendar is that of a plan.
-  struct Holds {
+  struct IsValid {
     const NextEvent<D>* plans;
     bool operator()(const CalendarEntry& entry) const { return plans[entry.slot].due() == entry.time; }
   };
 
-  bool alone(Slot slot, double time);
+  bool serve_alone(Slot slot, double time);
   bool next_tied(double end, Slot& slot, double& time);
   Slot slot_of(std::uint32_t partner) const { return flights_.packing().slot(partner); }
   bool mirrored(Slot i, Slot j) const;

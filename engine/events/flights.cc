@@ -152,7 +152,8 @@ double Flights<D>::wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall)
     throw Error(Failure::numerical, "the speed of particle " + std::to_string(r.id) +
                                         " is too large: its square is no number; give smaller velocities, "
                                         "temperatures and accelerations");
-  if (s == 0 && !(wall.opening(r.v, r.t) - rate < -slack) && !wall.thermal())
+  const bool approaches = wall.opening(r.v, r.t) - rate < -slack;
+  if (s == 0 && !approaches && !wall.thermal())
     throw Error(Failure::numerical,
                 "particle " + std::to_string(r.id) + " rests on " + box_.wall_name(wall.number) +
                     " under the uniform field and would bounce without end; give it a height or a velocity");
@@ -226,15 +227,15 @@ EventResult<D> Flights<D>::meet_alone(const EventKey<D>& key, Slot i, Record<D>&
 
 template <int D>
 Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
-                                  const EventResult<D>& impact) const {
-  const auto& [d, impulse, exchange, overlap, sigma] = impact;
+                                  const EventResult<D>& result) const {
+  const auto& [d, impulse, exchange, overlap, sigma] = result;
   if (a.id < b.id) return {key, a.x, b.x - shift, impulse, exchange, overlap, sigma, a.v, b.v};
   return {key, b.x, a.x + shift, -impulse, exchange, overlap, sigma, b.v, a.v};
 }
 
 template <int D>
-Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& r, const EventResult<D>& impact) const {
-  const auto& [d, impulse, exchange, overlap, sigma] = impact;
+Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& r, const EventResult<D>& result) const {
+  const auto& [d, impulse, exchange, overlap, sigma] = result;
   const Vec<D> touched = key.kind == EventKind::wall ? box_.wall(key.hi).foot(r.x, key.time) : r.x;
   return {key, r.x, touched, impulse, exchange, overlap, sigma, r.v};
 }

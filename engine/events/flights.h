@@ -19,7 +19,7 @@
 
 namespace carom {
 
-/// The result of a collision.
+/// The result of an event: a contact or a kick.
 template <int D>
 struct EventResult {
   Vec<D> d;        ///< from the second centre to the first [length]
@@ -113,8 +113,8 @@ class Flights {
 
   /// The contact reported to observers after a collision of two spheres, or after a lone event.
   Contact<D> contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
-                        const EventResult<D>& impact) const;
-  Contact<D> contact_of(const EventKey<D>& key, const Record<D>& r, const EventResult<D>& impact) const;
+                        const EventResult<D>& result) const;
+  Contact<D> contact_of(const EventKey<D>& key, const Record<D>& r, const EventResult<D>& result) const;
 
   // Lone events are the events of one sphere without a partner: contacts with walls and kicks by a bath.
   bool has_lone_events() const { return lone_events_; }

@@ -16,16 +16,18 @@
 
 namespace carom {
 
-/// The time, from t on and before `rest`, until a sphere that moves on x + v s + a s²/2 meets a wall, while its radius
-/// grows at `rate`: from the front or, if it is on its way through a one-way wall, when it has come back. A gap up to
-/// `tolerance` touches; `slack()` gives the approach of a touching sphere that is rounding (contact.h).
+/// The time, from t on and before `time_left`, until a sphere that moves on x + v s + a s²/2 meets a wall, while its
+/// radius grows at `rate`: from the front or, if it is on its way through a one-way wall, when it has come back. A gap
+/// up to `tolerance` touches; `slack()` returns the largest speed of approach that rounding alone can cause for a
+/// sphere that touches (contact.h).
 template <int D, class Slack>
 double wall_meeting(const Wall<D>& wall, const Vec<D>& x, const Vec<D>& v, const Vec<D>& a, double radius, double rate,
-                    double t, double rest, double tolerance, Slack&& slack) {
+                    double t, double time_left, double tolerance, Slack&& slack) {
   const double gap = wall.gap(x, radius, t), opening = wall.opening(v, t) - rate, speeding = wall.speeding(a);
-  if (wall.one_way && !(gap < kNever)) return return_time(wall.clearance(x, radius, t), opening, speeding, rest);
+  if (wall.one_way && !(gap < kNever)) return return_time(wall.clearance(x, radius, t), opening, speeding, time_left);
   const bool touching = gap <= tolerance;
-  if (wall.amplitude == 0) return wall_contact_time(gap, opening, speeding, rest, touching, touching ? slack() : 0.0);
+  if (wall.amplitude == 0)
+    return wall_contact_time(gap, opening, speeding, time_left, touching, touching ? slack() : 0.0);
   if (!(gap < kNever)) return kNever;
   const ShakenGap shaken{.y = wall.normal.dot(x) - (wall.offset + wall.velocity * t) - radius,
                          .v = wall.along_normal(v) - wall.velocity - rate,
@@ -33,7 +35,7 @@ double wall_meeting(const Wall<D>& wall, const Vec<D>& x, const Vec<D>& v, const
                          .amplitude = wall.amplitude,
                          .frequency = wall.frequency,
                          .turns = wall.turns + wall.frequency * t};
-  return shaken.first_contact(rest, touching, touching ? slack() : 0.0);
+  return shaken.first_contact(time_left, touching, touching ? slack() : 0.0);
 }
 
 /// The factor g of the impulse: the first sphere receives g·d, the second −g·d, with d = x_i − x_j at contact and v =
@@ -77,7 +79,8 @@ template <int D>
                                                             double w = 0) {
   if (laws.elastic()) return {.factor = collision_factor<D>(d, v, a.mass, b.mass, sigma, w)};
   const double closing = -(d.dot(v) - sigma * w), square = closing * closing / d.squaredNorm();
-  const double e = laws.of_pair(a.species, b.species).at(std::sqrt(square), laws.thermal_speed, laws.slow);
+  const double e = laws.of_pair(a.species, b.species)
+                       .restitution_at(std::sqrt(square), laws.thermal_speed, laws.restitution_when_slow);
   return {.factor = collision_factor<D>(d, v, a.mass, b.mass, sigma, w, e),
           .dissipated = 0.5 * (1 - e * e) * square / (1 / a.mass + 1 / b.mass)};
 }
@@ -113,7 +116,9 @@ WallImpulse<D> wall_impulse(const ContactLaws& laws, const Wall<D>& wall, const 
     return {after, impulse, {.impulse = wall.along_normal(impulse), .work = work, .heat = gained - work}};
   }
   const double closing = rate - wall.opening(v, t);
-  const double e = laws.elastic() ? 1 : laws.of_wall(a.species, wall.number).at(closing, laws.thermal_speed, laws.slow);
+  const double e = laws.elastic() ? 1
+                                  : laws.of_wall(a.species, wall.number)
+                                        .restitution_at(closing, laws.thermal_speed, laws.restitution_when_slow);
   const Vec<D> after = wall.bounced(v, t, rate, e);
   const Vec<D> impulse = a.mass * (after - v);
   WallImpulse<D> bounced{after,

@@ -27,7 +27,7 @@ double ShakenGap::slope(double s) const {
 // parabola with this second derivative, and the root of the parabola is a time before the contact. These times converge
 // to the contact as fast as Newton's, from before it. Where the sphere is beyond the reach of the sine, the time at
 // which it comes into its reach is exact.
-double ShakenGap::first_contact(double rest, bool touching, double slack) const {
+double ShakenGap::first_contact(double time_left, bool touching, double slack) const {
   const double reach = std::abs(amplitude), omega = kTwoPi * frequency;
   const double most = std::max(omega * omega * reach - a, kEpsilon * omega * omega * reach);
   const double scale = std::abs(y) + reach;
@@ -45,15 +45,15 @@ double ShakenGap::first_contact(double rest, bool touching, double slack) const 
       s = std::max(s, 1.5 * apart / (omega * omega * omega * reach));  // third derivative: half the safe time
     }
   }
-  while (s < rest) {
+  while (s < time_left) {
     const double above = y + s * (v + 0.5 * a * s) - reach;
     if (above > kEpsilon * scale) {
-      const double in_reach = wall_contact_time(above, v + a * s, a, rest - s, false, 0);
+      const double in_reach = wall_contact_time(above, v + a * s, a, time_left - s, false, 0);
       if (in_reach == kNever) return kNever;
       s += in_reach;
     }
     const double gap = at(s), falling = -slope(s);
-    if (gap <= 4 * kEpsilon * scale && falling > 0) return s < rest ? s : kNever;
+    if (gap <= 4 * kEpsilon * scale && falling > 0) return s < time_left ? s : kNever;
     const double root = std::sqrt(falling * falling + 2 * most * std::max(gap, 0.0));
     const double ahead = falling > 0 ? 2 * gap / (root + falling) : (root - falling) / most;
     const double next = s + std::max(ahead, least(s));

@@ -145,7 +145,7 @@ class Trace {
   double fastest_squared() const { return fastest_squared_; }  ///< over all spheres, after events
 
  private:
-  // The capacity of a log: a window has 0.3 events a sphere.
+  // The capacity of a log: a window has less than 0.1 events a sphere (kCollisionsPerWindow in window_length.cc).
   static constexpr std::size_t kMaxEvents = 20'000, kMaxEventsPerSphere = 16;
 
   [[gnu::noinline]] void grow() {

@@ -58,7 +58,7 @@ void force_pass(const System<D>& system, Vectors<D> out, ForceSums<D>& forces, C
   if (arrive) arrive();
   system.decomposition.add_ghosts(forces);
   for (Id i = 0; i < out.size(); ++i) out[i] = forces.value(i);
-  if (!arrive) system.decomposition.update(out);
+  if (!arrive) system.decomposition.copy_to_ghosts(out);
   counters.force_passes += 1;
 }
 
@@ -210,7 +210,7 @@ template <int D>
 double shadow_term(const System<D>& system, const Particles<D>& at, Positions<D> a, Vectors<D> scratch,
                    Counters& counters) {
   std::vector<Vec<D>> v = at.v;  // some methods advance own particles only
-  system.decomposition.update(std::span(v));
+  system.decomposition.copy_to_ghosts(std::span(v));
   evaluate_hessian_product<D>(system, at.x, v, scratch, counters);
   ExactSeries sum;
   for (Id i = 0; i < at.size(); ++i) {

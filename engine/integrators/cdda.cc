@@ -42,8 +42,8 @@ class CollisionDiscreteDerivative : public Integrator<D> {
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
     watch_ = report.watch;
-    scan_->begin_slab(report.counters, report.contacts, &piece_->a(), slab.length, watch_);
-    if (watch_) watch_->cut();  // a solve changes the accelerations that the next one starts from
+    scan_->begin_step(report.counters, report.contacts, &piece_->a(), slab.length, watch_);
+    if (watch_) watch_->before_change();  // a solve changes the accelerations that the next one starts from
     auto& p = system.particles;
     const auto contact = [&](const Touch<D>& touch) {
       return resolve_contact<D>(touch.key, touch.normal, system.box, p);
@@ -52,9 +52,9 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     bool ended = false;
     while (!ended) {
       scan_->resolve(done, p.x, p.v, contact);
-      const double rest = slab.length - done;
-      if (!(rest > 0)) break;  // the last contact rounds to the end of the slab
-      const double wanted = std::min(rest, longest), tau = find_piece(p, wanted);
+      const double time_left = slab.length - done;
+      if (!(time_left > 0)) break;  // the last contact rounds to the end of the slab
+      const double wanted = std::min(time_left, longest), tau = find_piece(p, wanted);
       if (tau == 0) {  // no convergence
         longest = 0.5 * wanted;
         ++report.counters.slabs_halved;
@@ -64,7 +64,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
                           " pieces; the forces are not finite or far too stiff for step = " + short_text(slab.length));
         continue;
       }
-      ended = tau == rest;
+      ended = tau == time_left;
       if (!ended && done + tau == done) scan_->count_event(violator_);  // limits the number of pieces of length zero
       std::ranges::copy(piece_->x(), p.x.begin());
       std::ranges::copy(piece_->v(), p.v.begin());
@@ -78,16 +78,16 @@ class CollisionDiscreteDerivative : public Integrator<D> {
   }
 
  private:
-  /// Leaves in piece_ the longest piece from p, at most `rest`, that ends before or in the first contact; returns its
-  /// length, or 0 if the solver does not converge.
-  double find_piece(const Particles<D>& p, double rest) {
-    PieceEnd<D> end = solve(p, rest);
+  /// Leaves in piece_ the longest piece from p, at most `time_left`, that ends before or in the first contact; returns
+  /// its length, or 0 if the solver does not converge.
+  double find_piece(const Particles<D>& p, double time_left) {
+    PieceEnd<D> end = solve(p, time_left);
     if (!end.converged) return 0;
-    if (!end.violates) return rest;
-    double lo = 0, hi = rest, tau = rest, last_tau = 0, last_miss = 0;
+    if (!end.violates) return time_left;
+    double lo = 0, hi = time_left, tau = time_left, last_tau = 0, last_miss = 0;
     violator_ = end.violator;
     bool known = false;  // last_tau and last_miss are
-    for (int iteration = 0; hi - lo > 4 * std::numeric_limits<double>::epsilon() * rest; ++iteration) {
+    for (int iteration = 0; hi - lo > 4 * std::numeric_limits<double>::epsilon() * time_left; ++iteration) {
       const double miss = end.contact - tau;
       double next = end.contact;
       if (known && miss != last_miss && std::isfinite(miss)) {

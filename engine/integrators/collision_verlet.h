@@ -25,10 +25,10 @@ class VerletPieces {
     system_.fields.add_value("reactions", reactions_);
   }
 
-  void begin_slab(SlabReport<D>& report, double length) {
+  void begin_step(SlabReport<D>& report, double length) {
     counters_ = &report.counters;
     watch_ = report.watch;
-    scan_.begin_slab(report.counters, report.contacts, &accelerations_.a, length, watch_);
+    scan_.begin_step(report.counters, report.contacts, &accelerations_.a, length, watch_);
   }
 
   /// Applies the impulse to all contacts that approach; see ContactScan::resolve.
@@ -36,14 +36,14 @@ class VerletPieces {
     scan_.resolve(time, system_.particles.x, system_.particles.v, impulse);
   }
 
-  /// The time until the first contact, at most `rest`. Sets the accelerations of the piece: a plus the reactions of
-  /// resting contacts.
-  double next_contact(double rest) {
+  /// The time until the first contact, at most `time_left`. Sets the accelerations of the piece: a plus the reactions
+  /// of resting contacts.
+  double next_contact(double time_left) {
     flight_ = accelerations_.a;
-    if (!scan_.resting().empty()) scan_.hold(system_.particles.v, flight_, rest);
-    const double contact = scan_.earliest(system_.particles.x, system_.particles.v, flight_, rest).key.time;
-    if (contact < rest && watch_) watch_->cut();
-    return std::min(rest, contact);
+    if (!scan_.resting().empty()) scan_.hold(system_.particles.v, flight_, time_left);
+    const double contact = scan_.earliest(system_.particles.x, system_.particles.v, flight_, time_left).key.time;
+    if (contact < time_left && watch_) watch_->before_change();
+    return std::min(time_left, contact);
   }
 
   /// K(τ/2) D(τ) K(τ/2). Call next_contact() first.

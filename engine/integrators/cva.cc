@@ -25,15 +25,15 @@ class CollisionVerlet : public Integrator<D> {
   Positions<D> accelerations() const override { return pieces_->a(); }
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
-    pieces_->begin_slab(report, slab.length);
+    pieces_->begin_step(report, slab.length);
     double done = 0;
     for (bool contact = true; contact;) {
       pieces_->collide(done, [&](const Touch<D>& touch) {
         return resolve_contact<D>(touch.key, touch.normal, system.box, system.particles);
       });
-      const double rest = slab.length - done, tau = pieces_->next_contact(rest);
-      contact = tau < rest;
-      pieces_->advance(contact ? tau : rest);
+      const double time_left = slab.length - done, tau = pieces_->next_contact(time_left);
+      contact = tau < time_left;
+      pieces_->advance(contact ? tau : time_left);
       done += tau;
     }
     system.wrap();

@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // edda: event-driven discrete gradients.
 //
-// In a slab [0, h] particle i moves under a constant acceleration of its own, a_i: parabolas, cut by collisions, which
-// change velocities and never a_i. That flow keeps K − Σ m_i a_i·x_i, whatever the a_i and whatever collides. With
+// In a piece [0, h] of a step, usually the whole step, particle i moves under a constant acceleration of its own, a_i:
+// parabolas, cut by collisions, which change velocities and never a_i. That flow keeps K − Σ m_i a_i·x_i, whatever the
+// a_i and whatever collides. With
 //
 //   m_i a_i = −∇̄_i V(x(0), x(h)),
 //
-// the discrete gradient between the slab's two ends, Σ m_i a_i·Δx_i = −(V(x(h)) − V(x(0))), so H is exact. The equation
-// is solved by sweeps: fly on a, evaluate a′ at the ends, continue with a′. The residual of the last sweep, e = a′ − a,
-// is applied as a kick, so that momentum is exact; the energy that is missing then,
+// the discrete gradient between the piece's two ends, Σ m_i a_i·Δx_i = −(V(x(h)) − V(x(0))), so H is exact. The
+// equation is solved by sweeps: fly on a, evaluate a′ at the ends, continue with a′. The residual of the last sweep, e
+// = a′ − a, is applied as a kick, so that momentum is exact; the energy that is missing then,
 //
 //   r = Σ m [e·(Δx − h v′) − ½ h² e²],   v′ before the kick,
 //
 // is folded into the velocities by a common factor. If the kinetic energy is too small for that, the sweeps continue to
-// rounding, or the slab is shortened; the energy that rounding then leaves is carried over to the next slab.
+// rounding, or the piece is shortened; the energy that rounding then leaves is carried over to the next piece.
 //
 // Contacts at rest are held by reactions (engine/stepping/resting.h), which are part of m a′; their work, zero once the
 // sweeps have converged, is part of r.
@@ -40,11 +41,12 @@ namespace {
 
 constexpr int kMostPieces = 1 << 17;    // of a step
 constexpr int kPiecesBeforeGrowth = 4;  // pieces that take few sweeps, before twice the length is tried
-constexpr int kFewSweeps = SweepControl::kMostSweeps / 3;  // two pieces of half the length would hardly take more
+constexpr int kFewSweeps =
+    SweepControl::kMostSweeps / 3;  // after pieces with at most this many, a piece of twice the length is tried
 constexpr std::uint64_t kPartialUpdate = 5;  // if fewer than one particle in 5 moved, only its pairs are evaluated
-constexpr int kSwapsBeforeFreezing = 3;      // swaps of partners once particles may be frozen, until one is
-constexpr double kFrequencyMargin = 1.1;     // for frequencies above the estimate
-constexpr std::int64_t kSlabsPerFrequency = 1000;  // slabs for which the estimate is used
+constexpr int kSwapsBeforeFreezing = 3;   // a particle is frozen at the next swap; swaps count once freezing may begin
+constexpr double kFrequencyMargin = 1.1;  // for frequencies above the estimate
+constexpr std::int64_t kStepsPerFrequency = 1000;  // steps for which the estimate is used
 constexpr double kMostFolded = 0.1;                // of the kinetic energy
 // The rounding of positions changes the energy by this fraction of Σ |F| |x|, in any method.
 constexpr double kRoundingOfForces = 16 * std::numeric_limits<double>::epsilon();
@@ -81,14 +83,15 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     set_scales(system);
     const auto sum = [&](auto&& term) { return sum_over_all<D>(system, term); };
     const double mass = sum([&](Id i) { return p.mass[i]; });
-    const bool free = system.size() > 1 && system.keeps_momentum();  // and more than it moves
+    const bool free =
+        system.size() > 1 && system.keeps_momentum();  // so that particles can move relative to the centre of mass
     for (int k = 0; k < D; ++k)
       scales_.centre[k] = free ? sum([&](Id i) { return p.mass[i] * p.v[i][k]; }) / mass : 0.0;
   }
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
-    slab_ = slab.index;
+    step_ = slab.index;
     if (!system.box.contacts.elastic()) set_scales(system);
     watch_ = report.watch;
     core_->begin_step(report.counters, report.contacts, &past_.last(), slab.length, watch_);
@@ -102,9 +105,9 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
  private:
   /// Results of one step that later steps use.
   struct Found {
-    bool touching = true;                         // contacts at the slab's start may have to be resolved
+    bool touching = true;                         // contacts at the start of the next piece may have to be resolved
     double squared_frequency = 0;                 // the largest; 0 as long as the sweeps contract fast
-    std::int64_t measured = -kSlabsPerFrequency;  // the slab in which squared_frequency was estimated
+    std::int64_t measured = -kStepsPerFrequency;  // the step in which squared_frequency was estimated
     double longest = kNever;                      // the longest piece in which the sweeps converge
     int converged = 0;                            // pieces of this length that took few sweeps
   };
@@ -124,43 +127,44 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     auto& p = system.particles;
     auto& scan = core_->scan();
     // A piece is no longer than the sweeps converge in, and ends where a contact comes to rest or a resting one is hit.
-    double done = 0, contact = kNever;
+    double done = 0, until_contact = kNever;
     double& longest = found_.longest;
     while (done < slab.length) {
-      const bool resolved = found_.touching;
-      if (resolved && (found_.touching = system.decomposition.any(!scan.quiet(done, p.x, p.v)))) {
+      const bool looked = found_.touching;
+      if (looked) found_.touching = system.decomposition.any(scan.find_contacts(done, p.x, p.v));
+      if (found_.touching) {
         system.decomposition.need_all();
         owed_ += scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) {
           return resolve_contact<D>(touch.key, touch.normal, system.box, p);
         });
         found_.touching = !scan.resting().empty();
       }
-      const double rest = slab.length - done, piece = std::min({longest, contact, rest});
-      if (solve(system, piece, resolved)) {
+      const double time_left = slab.length - done, piece = std::min({longest, until_contact, time_left});
+      if (solve(system, piece, looked)) {
         core_->commit(done);
-        if (piece < rest && watch_) watch_->cut();
+        if (piece < time_left && watch_) watch_->before_change();
         finish(system, piece);
         ++counters_->pieces;
-        done = piece == rest ? slab.length : done + piece;
+        done = piece == time_left ? slab.length : done + piece;
         if (piece == longest && sweeps_ <= kFewSweeps && ++found_.converged >= kPiecesBeforeGrowth) {
           longest = std::max(2 * piece, slab.length / kMostPieces);
           found_.converged = 0;
         }
-        found_.touching = found_.touching || contact < kNever;
-        contact = kNever;
+        found_.touching = found_.touching || until_contact < kNever;
+        until_contact = kNever;
         continue;
       }
       system.decomposition.need_all();
       if (!end_.complete && !end_.too_strong) {
         scan.count_event(end_.key);
-        contact = end_.time > 0 ? end_.time : kNever;
-        found_.touching = found_.touching || contact == kNever;
+        until_contact = end_.time > 0 ? end_.time : kNever;
+        found_.touching = found_.touching || until_contact == kNever;
         continue;
       }
       ++counters_->slabs_halved;
       longest = 0.5 * piece;
       found_.converged = 0;
-      contact = kNever;
+      until_contact = kNever;
       if (longest * kMostPieces < slab.length && !end_.complete && end_.too_strong && end_.time > 0)
         throw Error(Failure::numerical,
                     partners(end_.key, system.box) + " collide again and again without moving, even in pieces of 1/" +
@@ -182,15 +186,16 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     }
   }
 
-  /// Sweeps over a slab from the present state. If it returns true, core_ holds the flight on a_, mean_ the resulting
-  /// accelerations, and balance_ the missing energy; if false, the slab must be shorter. `resolved`: the contacts at
-  /// its start have been handled.
+  /// Sweeps over a piece from the present state. If it returns true, core_ holds the flight on a_, mean_ the resulting
+  /// accelerations, and balance_ the missing energy; if false, the piece must be shorter: it ends at a contact if end_
+  /// is an incomplete flight that is not too strong, else it is halved. `resolved`: the contacts at its start have been
+  /// handled.
   bool solve(System<D>& system, double h, bool resolved) {
     const Stopwatch watch(counters_->seconds.sweep);
     auto& p = system.particles;
     const std::size_t n = p.size();
     Chebyshev chebyshev(0.25 * h * h * found_.squared_frequency);
-    // Stiff motion is not smooth from slab to slab.
+    // Stiff motion is not smooth from piece to piece.
     past_.expect(h, a_, chebyshev.plain() ? Extrapolation<D>::kOrder + 1 : 1);
     held_ = true;
     if (resting()) {
@@ -204,7 +209,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     any_freezes_ = false;
     const double scale = std::max(scales_.speed, h * scales_.strength);
     SweepControl control(resting() ? 0 : tolerance_ * scale);  // 0: rounding, else contacts at rest would open
-    while (control.more()) {
+    while (control.below_limit()) {
       if (watch_) watch_->look();
       end_ = core_->fly(a_);
       sweeps_ = control.sweep() + 1;
@@ -223,8 +228,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         if (!control.may_stall_again()) return false;
         freeze_stalled(largest / h);
       }
-      if (chebyshev.plain() && control.slow() && slab_ >= found_.measured + kSlabsPerFrequency) {
-        found_.measured = slab_;
+      if (chebyshev.plain() && control.slow() && step_ >= found_.measured + kStepsPerFrequency) {
+        found_.measured = step_;
         found_.squared_frequency = kFrequencyMargin * largest_squared_frequency(system);
         chebyshev = Chebyshev(0.25 * h * h * found_.squared_frequency);
         ++counters_->fallbacks;
@@ -255,7 +260,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     std::uint64_t pairs =
         all ? forces_.evaluate(system, p.x, x) : forces_.update(system, p.x, core_->last_x(), x, core_->moved().data());
     for (Id i = 0; i < x.size(); ++i) mean_[i] = forces_[i];
-    system.decomposition.update(std::span(mean_));
+    system.decomposition.copy_to_ghosts(std::span(mean_));
     for (Id i = 0; i < x.size(); ++i) mean_[i] /= p.mass[i];
     if (resting()) hold(system, h, false);
     std::array<double, 2> most{};
@@ -323,7 +328,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     };
     for_each_held([&](Id i) {
       flown_[i] =
-          first ? p.v[i] : Vec<D>(p.v[i] + (0.5 * h) * a_[i]);  // resting particles have no collision in the slab
+          first ? p.v[i] : Vec<D>(p.v[i] + (0.5 * h) * a_[i]);  // resting particles have no collision in the piece
       w_[i] = p.v[i] + (0.5 * h) * mean_[i];
     });
     held_ = scan.hold_means(p.x, flown_, w_, h);
@@ -333,7 +338,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     for_each_held([&](Id i) { mean_[i] = 2 / h * (w_[i] - p.v[i]); });
   }
 
-  /// Computes the velocities at the slab's end, with the kick h e, and the energy that is missing then. Returns false
+  /// Computes the velocities at the piece's end, with the kick h e, and the energy that is missing then. Returns false
   /// if that energy can neither be folded into the velocities nor be carried over as rounding. Collective.
   bool balance(System<D>& system, double h) {
     struct Sums {
@@ -343,12 +348,12 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     const auto& p = system.particles;
     const auto &x = core_->x(), &v = core_->v();
     for (Id i = 0; i < p.size(); ++i) v_end_[i] = v[i] + h * (mean_[i] - a_[i]);
-    ExactSeries lack, kinetic;
+    ExactSeries missing_here, kinetic;
     double pressing = 0;  // Σ |F| |x| of reactions
     if (resting()) {      // then every rank has all particles
       const double lost = core_->scan().slide(x, v_end_, h);
       if (system.decomposition.ranks().rank() == 0) {
-        lack.add(lost);
+        missing_here.add(lost);
         for (const auto& contact : core_->scan().resting()) {
           const Id lo = contact.key.lo, hi = contact.key.hi;
           Vec<D> moved = x[lo] - p.x[lo];
@@ -356,7 +361,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
             moved -= x[hi] - p.x[hi];
           else
             moved -= h * core_->scan().mean_speed(hi, h) * contact.normal;
-          lack.add(-contact.force * contact.normal.dot(moved) / contact.normal.norm());
+          missing_here.add(-contact.force * contact.normal.dot(moved) / contact.normal.norm());
         }
       }
       for (const auto& contact : core_->scan().resting()) pressing += contact.force * p.x[contact.key.lo].norm();
@@ -364,18 +369,19 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     for (Id i = 0; i < p.size(); ++i) {
       if (!p.owns(i)) continue;
       const Vec<D> e = mean_[i] - a_[i];
-      lack.add(moving_mass(p.mass[i]) * (e.dot(x[i] - p.x[i] - h * v[i]) - 0.5 * h * h * e.squaredNorm()));
+      missing_here.add(moving_mass(p.mass[i]) * (e.dot(x[i] - p.x[i] - h * v[i]) - 0.5 * h * h * e.squaredNorm()));
       kinetic.add(0.5 * moving_mass(p.mass[i]) * (v_end_[i] - centre()).squaredNorm());
     }
-    const Sums sums = system.decomposition.sum(Sums{lack.sum(), kinetic.sum()});
+    const Sums sums = system.decomposition.sum(Sums{missing_here.sum(), kinetic.sum()});
     const double missing = sums.missing.value(), most = kMostFolded * sums.kinetic.value();
     const bool folds_all = std::abs(missing + owed_) <= most, folds = folds_all || std::abs(missing) <= most;
     const double r = folds_all ? missing + owed_ : missing, share = r / sums.kinetic.value();
-    balance_ = {.owed = folds_all ? 0
-                        : folds   ? owed_
-                                  : owed_ + missing,
-                .folded = folds ? std::abs(r) : 0,
-                .stretch = folds && r != 0 ? share / (1 + std::sqrt(1 + share)) : 0};
+    balance_ = {
+        .owed = folds_all ? 0
+                : folds   ? owed_
+                          : owed_ + missing,
+        .folded = folds ? std::abs(r) : 0,
+        .stretch = folds && r != 0 ? share / (1 + std::sqrt(1 + share)) : 0};  // √(1 + share) − 1 without cancellation
     if (any_freezes_)
       balance_.frozen =
           static_cast<std::uint64_t>(sum_over_all<D>(system, [&](Id i) { return frozen(i) ? 1.0 : 0.0; }));
@@ -386,7 +392,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     return std::abs(missing) <= kRoundingOfForces * (forces + pressing);
   }
 
-  /// Moves the particles to the slab's end and folds in the missing energy.
+  /// Moves the particles to the piece's end and folds in the missing energy.
   void finish(System<D>& system, double h) {
     auto& p = system.particles;
     core_->scan().remember(h);
@@ -419,16 +425,16 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   struct Balance {
     double owed = 0, folded = 0, stretch = 0;
     std::uint64_t frozen = 0;
-  } balance_;                         // of the last slab that was solved
+  } balance_;                         // of the last piece that was solved
   double owed_ = 0;                   // missing energy that is carried over
-  double pressed_ = 0;                // the largest speed that a single reaction causes in the slab
+  double pressed_ = 0;                // the largest speed that a single reaction causes in the piece
   bool held_ = true;                  // the reactions were found
   std::vector<std::uint32_t> swaps_;  // of partners, by particle
-  bool any_freezes_ = false;          // on any rank, in this slab
+  bool any_freezes_ = false;          // on any rank, in this piece
   Found found_, kept_;                // kept_: at the end of the last step
-  int sweeps_ = 0;                    // of the last slab
+  int sweeps_ = 0;                    // of the last piece
   FlightEnd<D> end_;                  // of the last flight
-  std::int64_t slab_ = 0;
+  std::int64_t step_ = 0;
   std::vector<Vec<D>> move_;  // change of a_ in the last sweep
   Counters* counters_ = nullptr;
   SlabWatch* watch_ = nullptr;

@@ -30,7 +30,7 @@ class FreeFlight : public Integrator<D> {
     if (ranks.size() > 1)
       windowed_.emplace(system.box, system.decomposition.sizes(), ranks);
     else
-      core_.emplace(system.box, system.particles);
+      core_.emplace(system.box);
     for (const auto& term : system.interactions) g_ += *term->common_acceleration();  // refusal() takes no others
   }
 
@@ -61,19 +61,22 @@ class FreeFlight : public Integrator<D> {
       flight.give_back(reached, system.particles);
       time = start + reached;
     };
-    // Runs to `end` or to a limit; returns whether it reached `end`.
     const std::uint64_t contacts = report.counters.contacts();
+    // Runs to `end` or to a limit; returns whether it reached `end` and no limit: the last contact may be at `end`.
     const auto run = [&](double end) {
       const Stopwatch watch(report.counters.seconds.queue);
-      report.reached =
-          flight.run(end, {report.counters, report.contacts, slab.collision_limit, most, slab.contact_limit});
+      report.reached = flight.run(end, {.counters = report.counters,
+                                        .contacts = report.contacts,
+                                        .collision_limit = slab.collision_limit,
+                                        .max_events = most,
+                                        .contact_limit = slab.contact_limit});
       return report.reached == end && report.counters.sphere_sphere < slab.collision_limit &&
              report.counters.contacts() - contacts < slab.contact_limit;
     };
     const auto observe = [&](double due) {
       if (!run(due)) return false;
       if (copies_.mass.empty()) copies_ = system.particles;
-      flight.fly_to(due, copies_);
+      flight.copy_at(due, copies_);
       copies_.image = system.particles.image;
       for (std::size_t i = 0; i < copies_.size(); ++i) system.box.wrap(copies_.x[i], copies_.image[i]);
       time = start + due;
@@ -84,7 +87,7 @@ class FreeFlight : public Integrator<D> {
     try {
       if (std::ranges::all_of(report.observe, observe)) run(slab.length);
     } catch (...) {
-      if (!windowed_) end_at(flight.now());
+      if (!windowed_) end_at(flight.now());  // so that messages can name positions; with ranks it would be collective
       throw;
     }
     end_at(report.reached);
@@ -103,7 +106,7 @@ class FreeFlight : public Integrator<D> {
   std::optional<EventCore<D>> core_;  // one of these two is used
   std::optional<WindowedFlight<D>> windowed_;
   std::int64_t epoch_ = -1;
-  std::uint64_t contacts_ = 0;  // in the epoch before this slab
+  std::uint64_t contacts_ = 0;  // of the present epoch in its earlier slabs
   Particles<D> copies_;
 };
 

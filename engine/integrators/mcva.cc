@@ -54,8 +54,8 @@ class ModifiedCollisionVerlet : public Integrator<D> {
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
-    pieces_->begin_slab(report, slab.length);
-    if (restart_ && report.watch) report.watch->cut();
+    pieces_->begin_step(report, slab.length);
+    if (restart_ && report.watch) report.watch->before_change();
     if (restart_)
       restart_slab(system, slab.length);
     else
@@ -77,8 +77,8 @@ class ModifiedCollisionVerlet : public Integrator<D> {
     double done = 0;
     for (bool contact = true; contact;) {
       collide(system, done);
-      const double rest = length - done, tau = pieces_->next_contact(rest);
-      contact = tau < rest;
+      const double time_left = length - done, tau = pieces_->next_contact(time_left);
+      contact = tau < time_left;
       advance(system, tau);
       done += tau;
     }
@@ -94,9 +94,9 @@ class ModifiedCollisionVerlet : public Integrator<D> {
     double node_time = -lag_;
     for (;;) {
       collide(system, node_time);
-      const double rest = length - node_time;
-      const bool whole = rest >= h_ * (1 - 1e-12);  // a whole step fits
-      const double limit = whole ? h_ : rest, tau = pieces_->next_contact(limit);
+      const double time_left = length - node_time;
+      const bool whole = time_left >= h_ * (1 - 1e-12);  // a whole step fits
+      const double limit = whole ? h_ : time_left, tau = pieces_->next_contact(limit);
       if (tau == limit && !whole) break;
       advance(system, tau);
       node_time += tau;

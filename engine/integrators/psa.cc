@@ -73,7 +73,7 @@ class PrimitiveSplitting : public Integrator<D> {
     };
     bool touching = begin_drift();
     for (double contact = kNever; done < length;) {
-      const double rest = length - done, piece = std::min(rest, contact);
+      const double time_left = length - done, piece = std::min(time_left, contact);
       kicked_ = p.v;
       core_->begin(kicked_, {}, piece, touching);
       const FlightEnd<D> end = core_->fly({});
@@ -86,7 +86,7 @@ class PrimitiveSplitting : public Integrator<D> {
       }
       core_->commit(done);
       core_->finish(p);
-      done = piece == rest ? length : done + piece;
+      done = piece == time_left ? length : done + piece;
       contact = kNever;
       if (done < length) touching = begin_drift();
     }
@@ -102,7 +102,7 @@ class PrimitiveSplitting : public Integrator<D> {
   bool resolve_contacts(System<D>& system, double time) {
     auto& p = system.particles;
     auto& scan = core_->scan();
-    if (!system.decomposition.any(!scan.quiet(time, p.x, p.v))) return false;
+    if (!system.decomposition.any(scan.find_contacts(time, p.x, p.v))) return false;
     system.decomposition.need_all();
     scan.resolve(time, p.x, p.v,
                  [&](const Touch<D>& touch) { return resolve_contact<D>(touch.key, touch.normal, system.box, p); });

@@ -21,7 +21,7 @@ class SweepControl {
 
   int sweep() const { return sweep_; }
   double wanted() const { return wanted_; }
-  bool more() const { return sweep_ < kMostSweeps; }
+  bool below_limit() const { return sweep_ < kMostSweeps; }
 
   /// The residual of a further sweep. `rounding`: the residual that the rounding of forces may leave.
   void note(double residual, double rounding) {

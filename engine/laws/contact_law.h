@@ -37,9 +37,9 @@ struct ContactLaw {
   /// Whether a contact with this normal speed of approach changes spins; slower ones are smooth.
   bool rubs(double speed, double thermal_speed) const { return rough() && speed >= slowest(thermal_speed); }
   double slowest(double thermal_speed) const { return rest_speed < 0 ? kRestFraction * thermal_speed : rest_speed; }
-  /// e for an approach at this speed; `slow`: below the rest speed.
-  double at(double speed, double thermal_speed, double slow) const {
-    if (!(speed >= slowest(thermal_speed))) return elastic() ? 1 : slow;
+  /// e for an approach at this speed; `when_slow`: below the rest speed.
+  double restitution_at(double speed, double thermal_speed, double when_slow) const {
+    if (!(speed >= slowest(thermal_speed))) return elastic() ? 1 : when_slow;
     return exponent == 0 ? restitution : std::min(1.0, elementary::pow(speed / v0, -exponent));
   }
 };
@@ -50,7 +50,7 @@ class ContactLaws {
   double thermal_speed = 0;  ///< √(Σ m v²/(D Σ m)) at the start of the slab [length/time]
   /// e of approaches slower than the rest speed: 1 in free flight, which would otherwise need endless collisions in a
   /// finite time (Luding, McNamara, Granul. Matter 1 (1998) 113); 0 in methods with steps, which hold contacts at rest.
-  double slow = 1;
+  double restitution_when_slow = 1;
 
   /// Whether all contacts are elastic and smooth.
   bool elastic() const { return laws_.empty(); }

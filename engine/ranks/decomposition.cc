@@ -138,7 +138,7 @@ bool Decomposition<D>::divide_if_due(std::int64_t slab, double slab_length) {
 
 template <int D>
 void Decomposition<D>::enlarge_halo(std::int64_t slab, double slab_length) {
-  if (width_.asked() && migrate_to_near(slab_length)) return;
+  if (width_.take_request() && migrate_to_near(slab_length)) return;
   migrate_to_all();
   next_ = slab + slabs_with_all_;
   slabs_with_all_ = std::min(2 * slabs_with_all_, kSlabsPerDivision);
@@ -170,7 +170,7 @@ void Decomposition<D>::migrate(double slab_length) {
   if (!local_ || !migrate_to_near(slab_length)) migrate_to_all();
 }
 
-/// The messages of pack_own(). Afterwards this rank has no particles, unless `stay` is given.
+/// Packs this rank's particles for their receivers and empties the system; with `stay`, particles that stay are kept.
 template <int D>
 std::vector<Bytes> Decomposition<D>::pack(const std::vector<std::uint64_t>& particles, auto&& for_each_receiver,
                                           std::vector<Fields::Arrival>* stay) {
@@ -295,9 +295,9 @@ void Decomposition<D>::need_deeper_halo() {
 template <int D>
 void Decomposition<D>::update_halo() {
   if (knows_all()) return;
-  update(std::span(system_.particles.x), std::span(system_.particles.v));
+  copy_to_ghosts(std::span(system_.particles.x), std::span(system_.particles.v));
   if (system_.box.contacts.need_internal())
-    system_.particles.for_each_internal([&](auto& array, auto) { update(std::span(array)); });
+    system_.particles.for_each_internal([&](auto& array, auto) { copy_to_ghosts(std::span(array)); });
 }
 
 template class Decomposition<2>;

@@ -36,8 +36,8 @@ namespace carom {
 template <int D>
 struct System;
 
-/// Thrown on all ranks together, with the system unchanged: the halos were too small for a slab, which must be repeated
-/// after enlarge_halo().
+/// Thrown on all ranks together, with the system unchanged: the particles of a rank did not suffice for a slab, because
+/// a halo was too narrow or the work needs all particles. The slab must be repeated after enlarge_halo().
 struct HaloTooSmall {};
 
 template <int D>
@@ -117,7 +117,7 @@ class Decomposition {
 
   /// Ghosts get the values of their owners; each vector has an entry for each particle of this rank.
   template <class... T>
-  void update(std::span<T>... values) const {
+  void copy_to_ghosts(std::span<T>... values) const {
     if (by_place()) halo_.update(*ranks_, values...);
   }
   /// Adds forces on ghosts to those on the particles of their owners; call when all forces of a pass have been added.

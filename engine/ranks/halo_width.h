@@ -29,8 +29,9 @@ class HaloWidth {
   /// Call after a slab with too narrow halos: the next fit() allows paths of this length, or doubles the depth.
   void ask_for_path(double path);
   void ask_for_depth() { depth_ *= 2, asked_ = true; }
-  /// Whether the last slab asked for a wider halo that is finite; resets the flag.
-  bool asked() { return std::exchange(asked_, false); }
+  /// Whether the last slab asked for a wider halo that is finite; forgets it. If none was asked for, all ranks get all
+  /// particles.
+  bool take_request() { return std::exchange(asked_, false); }
   /// Call if the last division was good enough: the next halos may be narrower.
   void relax();
 

@@ -37,12 +37,12 @@ std::vector<Slot> Ownership<D>::own() const {
 /// Finds the own spheres that may reach the border before the next call.
 template <int D>
 void Ownership<D>::watch(double now) {
-  unwatched_ = 0, turns_ = 0;
+  unwatched_ = 0, number_with_events_ = 0;
   watched_.clear();
   quiet_.clear();
   speed_.clear();
   events_.clear();
-  turned_.resize(role_.size());
+  with_events_.resize(role_.size());
   watched_at_.assign(role_.size(), kUnwatched);
   const double reach = bisection_.reach() + (kWindowsBetweenSearches + 1) * max_displacement_;
   for (Slot i = 0; i < core_.flights().size(); ++i) {
@@ -57,7 +57,7 @@ void Ownership<D>::watch(double now) {
 /// Finds the owner of a sphere and the subdomains that have it as a ghost, from its present position, and how far it
 /// can move before either changes, which is returned. All subdomains that have the sphere find the same.
 template <int D>
-double Ownership<D>::look_at(Slot i, double now) {
+double Ownership<D>::update_role(Slot i, double now) {
   const Flights<D>& flights = core_.flights();
   const Vec<D> at = bisection_.wrapped(flights.at(i, now).x);
   const double depth = bisection_.depth(number_, at), reach = bisection_.reach();

@@ -40,16 +40,17 @@ class Ownership {
   Slot slot_of(Id id) const { return slots_.find(id); }
   bool admit(const Record<D>& r, double now, const Internal<D>& internal = {});
   void prefetch(Slot i) const { prefetch_line(&watched_at_[i]); }
-  /// Call in a window for each event of a sphere, or `often`: for a sphere that may have had several. False for spheres
-  /// far from the border, which are neither ghosts nor seen.
-  bool turn(Slot i, bool often = false) {
+  /// Call in a window for each event of a sphere, or with `several` for a sphere that may have had several. Returns
+  /// false if the sphere is not watched, because it is far from the border and neither a ghost nor seen.
+  bool note_event(Slot i, bool several = false) {
     const std::uint32_t k = watched_at_[i];
     if (k == kUnwatched) return false;
-    if (events_[k] == Events::none) turned_[turns_++] = i;
-    events_[k] = events_[k] == Events::none && !often ? Events::one : Events::several;
+    if (events_[k] == Events::none) with_events_[number_with_events_++] = i;
+    events_[k] = events_[k] == Events::none && !several ? Events::one : Events::several;
     return true;
   }
-  /// As in Subdomain, after a window of this `length` [time].
+  /// Updates owners and ghosts after a window of this length [time]. Calls send(neighbour, record) for each own sphere
+  /// that has become a ghost there.
   template <class Send>
   void sort_out(double now, double length, Send&& send);
 
@@ -82,7 +83,7 @@ class Ownership {
   }
   void forget(Slot i);
   void watch(double now);
-  double look_at(Slot i, double now);
+  double update_role(Slot i, double now);
   /// The largest speed of a sphere until its next event, not 0.
   double speed(Slot i) const {
     return (1 + 1e-6) * core_.flights()[i].v.norm() + from_field_ + std::numeric_limits<double>::min();
@@ -107,8 +108,8 @@ class Ownership {
   std::vector<double> quiet_;              // of each: how far it may move before it must be examined again
   std::vector<double> speed_;              // of each: the largest until its first event since sort_out()
   std::vector<Events> events_;             // of each: since sort_out()
-  std::vector<Slot> turned_;               // spheres with events since sort_out(), each once
-  std::size_t turns_ = 0;                  // their number
+  std::vector<Slot> with_events_;          // spheres with events since sort_out(), each once
+  std::size_t number_with_events_ = 0;     // their number
 };
 
 template <int D>
@@ -116,8 +117,8 @@ template <class Send>
 void Ownership<D>::sort_out(double now, double length, Send&& send) {
   if (unwatched_ += max_displacement_; unwatched_ > kWindowsBetweenSearches * max_displacement_) watch(now);
   // A sphere with one event moved at most as fast as before or after it, one with several at most max_displacement_.
-  // The loop below subtracts its way at the speed after them.
-  for (const Slot i : std::span(turned_.data(), turns_)) {
+  // Here only the excess over speed · length is subtracted; the loop below subtracts speed · length itself.
+  for (const Slot i : std::span(with_events_.data(), number_with_events_)) {
     const std::uint32_t k = watched_at_[i];
     const double before =
         events_[k] == Events::one ? std::min(speed_[k] * length, max_displacement_) : max_displacement_;
@@ -125,7 +126,7 @@ void Ownership<D>::sort_out(double now, double length, Send&& send) {
     events_[k] = Events::none;
     quiet_[k] -= std::max(before - speed_[k] * length, 0.0);
   }
-  turns_ = 0;
+  number_with_events_ = 0;
   for (std::size_t k = 0; k < watched_.size(); ++k) quiet_[k] -= speed_[k] * length;
   const auto next = [&](std::size_t from) {
     const auto due = [](double quiet) { return !(quiet > 0); };
@@ -134,7 +135,7 @@ void Ownership<D>::sort_out(double now, double length, Send&& send) {
   for (std::size_t k = next(0); k < watched_.size(); k = next(k)) {
     const Slot i = watched_[k];
     const std::uint64_t before = holders_[i];
-    quiet_[k] = look_at(i, now);
+    quiet_[k] = update_role(i, now);
     if (role_[i] == Role::none) {  // the last one takes its place
       watched_at_[i] = kUnwatched;
       const auto drop = [k](auto& values) { values[k] = values.back(), values.pop_back(); };

@@ -22,6 +22,7 @@ void Subdomain<D>::load(std::vector<Bytes> spheres, const Bisection<D>& bisectio
     }
     Bytes().swap(message);
   }
+  // A sphere and the one that it may meet may each be this far from the start of the window, and so may their repairs.
   core_.load(std::move(records), g, horizon, now, 2 * max_displacement, internal);
   const auto number = static_cast<std::uint32_t>(ranks_.rank());
   ownership_.emplace(core_, bisection, number, max_displacement);
@@ -52,12 +53,12 @@ double Subdomain<D>::run(double now, double end) {
   Counters unused;
   double reached = end;
   try {
-    core_.run(end, {.counters = unused, .trace = &paths_->start()});
+    core_.run(end, {.counters = unused, .trace = &paths_->start_log()});
   } catch (LogFull) {
     reached = core_.now();
   }
   counts.run_events += paths_->trace().events().size();
-  changed_ = paths_->end();
+  changed_ = paths_->link_log();
   return reached;
 }
 
@@ -89,9 +90,9 @@ std::uint64_t Subdomain<D>::make_consistent(const std::function<bool(bool)>& agr
 }
 
 template <int D>
-bool Subdomain<D>::commit() {
-  const auto other = paths_->finish();
-  for (const auto& each : other) ownership_->turn(each.slot, true);
+bool Subdomain<D>::begin_window() {
+  const auto other = paths_->take_changes();
+  for (const auto& each : other) ownership_->note_event(each.slot, true);
   core_.put(other, end_);
   ownership_->sort_out(end_, length_, [&](std::size_t neighbour, const Record<D>& r) {
     put_sphere(outgoing_[neighbour], r, flights().internal(ownership_->slot_of(r.id)));

@@ -14,7 +14,7 @@
 //
 //   subdomain.load(messages, bisection, …);
 //   while (…) {
-//     subdomain.commit();
+//     subdomain.begin_window();
 //     subdomain.run(now, end);
 //     subdomain.make_consistent(agree);
 //   }
@@ -59,12 +59,12 @@ class Subdomain {
   /// Returns `end`, or the time of the first event for which the log has no room; the window is then invalid too.
   double run(double now, double end);
   /// Exchanges the paths of a window and repairs it, in rounds; returns their number. After every second round
-  /// agree(changed) is called, which gets whether paths changed here in this round that a neighbour has, and returns
-  /// whether a path changed on any rank: then there are two more.
+  /// agree(changed) is called; `changed` says whether a path that a neighbour knows has changed here. If it returns
+  /// true, two more rounds follow.
   std::uint64_t make_consistent(const std::function<bool(bool)>& agree);
-  /// Call before each window: ends the last one, updates ownership and ghosts, and sends neighbours the ghosts that
+  /// Ends the last window, updates ownership and ghosts, and sends neighbours the ghosts that
   /// they lack. Returns false if there was no room for a ghost: the next window is then invalid.
-  bool commit();
+  bool begin_window();
 
   /// Calls visit(slot, k) for each node k that is a contact with its lower id owned here.
   template <class Visit>

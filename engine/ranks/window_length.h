@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// The length of a window, chosen so that a sphere has a few tenths of a collision in it and moves no farther than
-// `max_displacement` from its start.
+// The length of a window, chosen so that a sphere has kCollisionsPerWindow, 0.15, collisions in it and moves no farther
+// than `max_displacement` from its start.
 
 #include <functional>
 #include <limits>

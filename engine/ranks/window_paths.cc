@@ -7,18 +7,18 @@
 namespace carom {
 
 template <int D>
-Trace<D>& WindowPaths<D>::start() {
+Trace<D>& WindowPaths<D>::start_log() {
   trace_.clear(flights_.capacity());
   return trace_;
 }
 
 template <int D>
-std::vector<Slot> WindowPaths<D>::end() {
+std::vector<Slot> WindowPaths<D>::link_log() {
   std::vector<Slot> seen;
   take_unmatched();
   const auto prefetch = [&](Slot i) { ownership_.prefetch(i); };
   trace_.link(prefetch, [&](Slot i, bool first) {
-    if (!ownership_.turn(i) || !first || (!ownership_.is_seen(i) && !ownership_.is_ghost(i))) return;
+    if (!ownership_.note_event(i) || !first || (!ownership_.is_seen(i) && !ownership_.is_ghost(i))) return;
     prefetch_line(&flights_[i]);  // its path will be read
     if (ownership_.is_seen(i))
       seen.push_back(i);
@@ -29,7 +29,7 @@ std::vector<Slot> WindowPaths<D>::end() {
 }
 
 template <int D>
-std::vector<typename EventCore<D>::Changed> WindowPaths<D>::finish() {
+std::vector<typename EventCore<D>::Changed> WindowPaths<D>::take_changes() {
   std::vector<typename EventCore<D>::Changed> other;
   for (const Slot slot : paths_.slots()) {
     const Record<D>&now = after(slot), &known = flights_[slot];
@@ -148,8 +148,8 @@ Contact<D> WindowPaths<D>::contact_of(Slot lo, std::size_t k) const {
   const EventKey<D> key = path.node(k).key;
   Node<D> a = path.node(k - 1);
   if (key.kind != EventKind::pair) {
-    const EventResult<D> impact = flights_.meet_alone(key, lo, a.after, &a.internal);
-    return flights_.contact_of(key, a.after, impact);
+    const EventResult<D> result = flights_.meet_alone(key, lo, a.after, &a.internal);
+    return flights_.contact_of(key, a.after, result);
   }
   const Slot hi = ownership_.slot_of(key.hi);
   const View other = view(hi);
@@ -157,9 +157,9 @@ Contact<D> WindowPaths<D>::contact_of(Slot lo, std::size_t k) const {
   while (other.node(before + 1).key != key) ++before;
   Node<D> b = other.node(before);
   const Vec<D> shift = box_.shift(key.image);
-  const EventResult<D> impact =
+  const EventResult<D> result =
       flights_.collide(lo, a.after, a.internal, hi, b.after, b.internal, shift, key.time, key.generation);
-  return flights_.contact_of(key, a.after, b.after, shift, impact);
+  return flights_.contact_of(key, a.after, b.after, shift, result);
 }
 
 template class WindowPaths<2>;

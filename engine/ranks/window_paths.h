@@ -30,12 +30,12 @@ class WindowPaths {
         listed_(flights.capacity()) {}
 
   /// Starts a window; the core must write to the returned log.
-  Trace<D>& start();
+  Trace<D>& start_log();
   /// Call when the log is complete; tells the ownership about spheres with events. Returns the own spheres with events
   /// that are ghosts elsewhere.
-  std::vector<Slot> end();
+  std::vector<Slot> link_log();
   /// Ends the window; returns the records that differ from the core's.
-  std::vector<typename EventCore<D>::Changed> finish();
+  std::vector<typename EventCore<D>::Changed> take_changes();
 
   const Trace<D>& trace() const { return trace_; }
   bool has_no_events(Slot i) const { return !paths_.has(i) && !trace_.has(i); }

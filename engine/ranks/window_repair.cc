@@ -34,24 +34,25 @@ std::vector<Slot> WindowRepair<D>::run(double end) {
   return changed;
 }
 
-/// Starts a repair where the path of a ghost differs from its script, except by a contact with an own sphere.
+/// Starts a repair where the path of a ghost differs from its script. A difference that is only a contact with an own
+/// sphere starts none, because this subdomain decides such contacts.
 template <int D>
 void WindowRepair<D>::compare(Slot g) {
   if (paths_.matches(g) || adopt(g)) return;
   paths_.add_unmatched(g);
-  const auto seen = paths_.events(g), script = paths_.script(g);
-  const auto [here, there] = std::mismatch(seen.begin(), seen.end(), script.begin(), script.end());
-  const bool sees = here != seen.end() && !ownership_.owns_id(here->partner());
-  if (there != script.end() && (here == seen.end() || there->key <= here->key)) {
-    if (ownership_.owns_id(there->partner()) && !sees) return;
+  const auto computed = paths_.events(g), script = paths_.script(g);
+  const auto [here, there] = std::mismatch(computed.begin(), computed.end(), script.begin(), script.end());
+  const bool without_own = here != computed.end() && !ownership_.owns_id(here->partner());
+  if (there != script.end() && (here == computed.end() || there->key <= here->key)) {
+    if (ownership_.owns_id(there->partner()) && !without_own) return;
     tasks_.push({.kind = Task::Kind::difference, .key = there->key, .a = g});
-  } else if (sees) {
+  } else if (without_own) {
     tasks_.push({.kind = Task::Kind::difference, .key = here->key, .a = g});
   }
 }
 
-/// Cuts the path of a sphere at `key`; its script is followed from there if it agrees up to there, and the partners of
-/// the removed events are checked.
+/// Cuts the path of a sphere at `key`. If path and script are equal up to there, the ghost follows its script from then
+/// on. Each partner of a removed event gets a task, because it may no longer meet this sphere.
 template <int D>
 typename WindowRepair<D>::Repaired& WindowRepair<D>::begin(Slot i, const EventKey<D>& key) {
   auto& path = paths_.path(i);

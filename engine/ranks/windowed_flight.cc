@@ -108,15 +108,17 @@ typename WindowedFlight<D>::Vote WindowedFlight<D>::vote_of_all(const Vote& mine
 template <int D>
 double WindowedFlight<D>::run(double end, const Report& report) {
   constexpr double kForever = std::numeric_limits<double>::infinity();
-  ContactTally sum, got;
+  ContactTally sum, last_tally;
   std::vector<Contact<D>> contacts;
   const std::uint64_t events_before = events_;
   std::uint64_t collisions = report.counters.sphere_sphere;  // in windows before the last one
-  double reached = end, length = 0, full = kForever;
+  double reached = end, last_length = 0, log_full_at = kForever;
+  // The tally of a window is summed over ranks in the first vote of the next one; then last_tally and last_length
+  // become zero, so that it counts once.
   while (now_ < end && reached == end) {
-    const bool room = subdomain_.commit();
+    const bool room = subdomain_.begin_window();
     const auto left = static_cast<double>(report.collision_limit - collisions);
-    double stop = std::min(length_.window_end(now_, end, left - length_.expected(length)), full);
+    double stop = std::min(length_.window_end(now_, end, left - length_.expected(last_length)), log_full_at);
     const double ran = subdomain_.run(now_, stop);
     Vote vote;
     bool valid = false;
@@ -125,21 +127,21 @@ double WindowedFlight<D>::run(double end, const Report& report) {
                           .no_room = !room,
                           .reached = ran,
                           .speed = subdomain_.fastest(),
-                          .collisions_before = got.sphere_sphere,
-                          .events_before = got.contacts(),
+                          .collisions_before = last_tally.sphere_sphere,
+                          .events_before = last_tally.contacts(),
                           .most_collisions = subdomain_.most_events()});
-      got = {};
+      last_tally = {};
       collisions += vote.collisions_before;
       events_ += vote.events_before;
-      if (length > 0) length_.note(std::exchange(length, 0), vote.collisions_before);
+      if (last_length > 0) length_.note(std::exchange(last_length, 0), vote.collisions_before);
       valid = !vote.no_room && vote.reached == stop && !length_.too_fast(vote.speed, stop - now_);
       return valid && vote.changed;
     });
     if (events_ > report.max_events) throw_too_many_contacts(report.max_events);
     length_.allow_for(vote.speed);
-    full = vote.reached < stop ? vote.reached : kForever;
+    log_full_at = vote.reached < stop ? vote.reached : kForever;
     if (!valid) {  // revoke the window; if the log has no room for more, run it up to there
-      if (!(full > now_)) throw_too_many_contacts(report.max_events);
+      if (!(log_full_at > now_)) throw_too_many_contacts(report.max_events);
       ++subdomain_.counts.cut;
       subdomain_.paths().cut({.time = -kForever});
       reload();
@@ -149,15 +151,15 @@ double WindowedFlight<D>::run(double end, const Report& report) {
     subdomain_.counts.rounds += rounds;
     if (!subdomain_.paths().all_match())
       throw Error(Failure::numerical, "internal error: subdomains do not agree about a window; please report this");
-    got = subdomain_.paths().tally();
+    last_tally = subdomain_.paths().tally();
     const auto end_at = [&](std::uint64_t before, std::uint64_t limit, bool pairs) {
       if (before + vote.most_collisions < limit) return;  // else it may have been reached
-      std::uint64_t count = pairs ? got.sphere_sphere : got.contacts();
+      std::uint64_t count = pairs ? last_tally.sphere_sphere : last_tally.contacts();
       ranks_.sum({&count, 1});
       if (before + count < limit) return;
       const EventKey<D> last = key_of_contact(limit - before, pairs);
       subdomain_.paths().cut(last);
-      got = subdomain_.paths().tally();
+      last_tally = subdomain_.paths().tally();
       reached = stop = last.time;
     };
     end_at(collisions, report.collision_limit, true);
@@ -165,9 +167,9 @@ double WindowedFlight<D>::run(double end, const Report& report) {
     if (report.contacts)
       subdomain_.for_each_contact(
           [&](Slot i, std::size_t k) { contacts.push_back(subdomain_.paths().contact_of(i, k)); });
-    sum.add(got);
-    subdomain_.counts.events += got.contacts();
-    length = stop - now_;
+    sum.add(last_tally);
+    subdomain_.counts.events += last_tally.contacts();
+    last_length = stop - now_;
     now_ = stop;
   }
   const ContactTally all = sum_of_all(ranks_, sum);
@@ -181,7 +183,7 @@ template <int D>
 void WindowedFlight<D>::give_back(double time, Particles<D>& particles) {
   measure_work();
   subdomain_.stop();
-  fly_to(time, particles);
+  copy_at(time, particles);
   subdomain_.release();
 }
 
@@ -199,7 +201,7 @@ void WindowedFlight<D>::measure_work() {
 
 /// Sends the spheres, advanced to a time, and their work to the ranks of their blocks.
 template <int D>
-void WindowedFlight<D>::fly_to(double time, Particles<D>& copies) {
+void WindowedFlight<D>::copy_at(double time, Particles<D>& copies) {
   struct State {
     std::uint32_t work;
     Vec<D> x, v;

@@ -35,10 +35,10 @@ class WindowedFlight {
                  std::function<double()> window = {});
 
   /// Functions as in EventCore. `particles` is this rank's block; contacts are reported on rank 0. After a run that the
-  /// collision limit has ended, only fly_to() and give_back() may follow.
+  /// collision limit has ended, only copy_at() and give_back() may follow.
   void take(Particles<D>& particles, const Vec<D>& g, double horizon);
   double run(double end, const Report& report);
-  void fly_to(double time, Particles<D>& copies);
+  void copy_at(double time, Particles<D>& copies);
   void give_back(double time, Particles<D>& particles);
   double now() const { return now_; }
 

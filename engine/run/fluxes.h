@@ -156,7 +156,7 @@ class FluxIntegral {
     Communicator* const others = system_.decomposition.others();
     const Vec<D> drift = others ? gather_values<Vec<D>>(*others, {&drift_, 1})[0] : drift_;  // only rank 0 knows it
     for (Vec<D>& each : v) each -= drift;
-    system_.decomposition.update(std::span(v));  // some methods advance own particles only
+    system_.decomposition.copy_to_ghosts(std::span(v));  // some methods advance own particles only
     PairFluxes<D> own;
     for (const auto& term : system_.interactions) term->add_fluxes(particles.x, v, own);
     if (others) own = sum_of_all(*others, own);

@@ -20,8 +20,8 @@ constexpr double kLongestEpoch = 1e9;
 RunClock::RunClock(const Plan& plan, bool stepping, std::size_t particles)
     : plan_(plan), stepping_(stepping), most_collisions_(std::max<std::uint64_t>(500'000, 4 * particles)) {}
 
-double RunClock::time_of(std::int64_t step) const {
-  return count.time + static_cast<double>(step - count.steps) * plan_.step;
+double RunClock::time_after(std::int64_t steps) const {
+  return count.time + static_cast<double>(steps - count.steps) * plan_.step;
 }
 
 double RunClock::length_from(double start) const {
@@ -32,16 +32,16 @@ double RunClock::length_from(double start) const {
 Slab RunClock::next_slab(const Statistics& s) const {
   Slab slab;
   slab.index = s.steps;
-  slab.start = time_of(slab.index) + count.within;
+  slab.start = time_after(slab.index) + count.within;
   slab.steps = count.stride;
   if (plan_.steps) slab.steps = std::min(slab.steps, *plan_.steps - slab.index);
   if (plan_.end_time) {
-    const double left = *plan_.end_time - plan_.end_slack() - time_of(slab.index);
+    const double left = *plan_.end_time - plan_.end_slack() - time_after(slab.index);
     slab.steps = static_cast<std::int64_t>(std::min(static_cast<double>(slab.steps), left / plan_.step));
   }
   slab.steps = std::max<std::int64_t>(slab.steps, 1);
   const double length =
-      slab.steps == 1 ? length_from(time_of(slab.index)) : static_cast<double>(slab.steps) * plan_.step;
+      slab.steps == 1 ? length_from(time_after(slab.index)) : static_cast<double>(slab.steps) * plan_.step;
   slab.length = length - count.within;
   if (!stepping_) {
     slab.contact_limit = 2 * most_collisions_;
@@ -71,10 +71,11 @@ double RunClock::fraction_done(const Statistics& s) const {
 bool RunClock::is_last_on_the_way(const Statistics& s) const {
   const Slab next = next_slab(s);
   // A slab that meets an end may differ from a step by rounding alone.
-  const bool whole = !cut_ && s.end_time == next.start &&
-                     (s.steps == s.start_steps || count.within > 0 || length_from(time_of(s.steps - 1)) == plan_.step);
+  const bool whole =
+      !cut_ && s.end_time == next.start &&
+      (s.steps == s.start_steps || count.within > 0 || length_from(time_after(s.steps - 1)) == plan_.step);
   if (!whole) return false;
-  if (finished(s) || next.steps < count.stride || length_from(time_of(s.steps)) != plan_.step) return true;
+  if (finished(s) || next.steps < count.stride || length_from(time_after(s.steps)) != plan_.step) return true;
   // Free flight ends within a slab at its last collision; the slab before predicts the number of collisions.
   return plan_.collisions && next.collision_limit == *plan_.collisions &&
          (!last_collisions_ || s.counters.sphere_sphere + 2 * *last_collisions_ + 1000 >= *plan_.collisions);
@@ -86,18 +87,18 @@ double RunClock::end_slab(const Slab& slab, double reached, std::uint64_t pairs,
   cut_ = slab.steps < count.stride;
   count.contacts += 2 * pairs + walls;
   count.boxes = std::max(count.boxes, boxes);
-  const double step = length_from(time_of(slab.index));
+  const double step = length_from(time_after(slab.index));
   if (reached < slab.length) {
     const double within = count.within + reached;
-    s.end_time = time_of(slab.index) + within;
+    s.end_time = time_after(slab.index) + within;
     if (finished(s))
-      ++s.steps;
+      ++s.steps;  // the run ends inside this epoch, at its last collision; the begun epoch counts as a step
     else
       count.within = within;
     return 0;
   }
   s.steps += slab.steps;
-  s.end_time = step == plan_.step ? time_of(s.steps) : *plan_.end_time;
+  s.end_time = step == plan_.step ? time_after(s.steps) : *plan_.end_time;
   return std::exchange(count.within, 0) + slab.length;
 }
 

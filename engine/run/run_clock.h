@@ -17,7 +17,8 @@ namespace carom {
 struct Plan;
 struct Statistics;
 
-/// The origin of the step count: step n ends at time + (n − steps) · Plan::step.
+/// Where the clock counts from, and how far it is in the present epoch. When `steps` steps were complete, the time was
+/// `time`; n steps are complete at time + (n − steps) · Plan::step.
 struct StepCount {
   std::int64_t steps = 0;
   double time = 0;
@@ -25,8 +26,8 @@ struct StepCount {
   double within = 0;
   // What happened in the epoch so far:
   double boxes = 0;            ///< PastEpoch::boxes
-  std::uint64_t contacts = 0;  ///< of pairs twice
-  /// Free flight with contacts that dissipate: an epoch is as many steps long as the gas is slower than at the start.
+  std::uint64_t contacts = 0;  ///< a contact of two spheres counts twice
+  /// Free flight with contacts that dissipate: if the gas is k times slower than at the start, an epoch has k steps.
   double first_speed = 0;   ///< thermal speed at the start [length/time]
   std::int64_t stride = 1;  ///< steps of the next slab
 };
@@ -39,7 +40,8 @@ class RunClock {
   /// See Simulation::limit_slabs().
   void limit_slabs(std::uint64_t collisions) { most_collisions_ = collisions; }
 
-  double time_of(std::int64_t step) const;
+  /// The time at which this number of steps is complete.
+  double time_after(std::int64_t steps) const;
   /// The length of the step that starts then: to the end of the run, if this is less than a step by more than rounding.
   double length_from(double start) const;
   Slab next_slab(const Statistics& s) const;
@@ -48,9 +50,9 @@ class RunClock {
   /// See Simulation::is_last_on_the_way().
   bool is_last_on_the_way(const Statistics& s) const;
 
-  /// Counts a slab that has reached this time within it: sets the steps and the time in `s`. `pairs` and `walls` are
-  /// its contacts, `boxes` its PastEpoch::boxes. Returns the length of the step or epoch if that is now complete, else
-  /// 0.
+  /// Counts a slab whose particles are now at `reached`, a time since its start: sets the steps and the time in `s`.
+  /// `pairs` and `walls` are its contacts, `boxes` its PastEpoch::boxes. Returns the length of the step or epoch if
+  /// that is now complete, else 0.
   double end_slab(const Slab& slab, double reached, std::uint64_t pairs, std::uint64_t walls, double boxes,
                   Statistics& s);
   /// The largest number of steps that an epoch may have.

@@ -250,7 +250,7 @@ void Simulation<D>::run(const Hooks& hooks) {
     if (system_->box.bath.kicks())
       std::erase_if(contacts, [](const auto& each) { return each.key.kind == EventKind::kick; });
     for (auto& contact : contacts) contact.key.time += clock_.count.within;
-    for (auto* observer : observers_) observer->contacts(clock_.time_of(slab.index), contacts);
+    for (auto* observer : observers_) observer->contacts(clock_.time_after(slab.index), contacts);
     contacts.clear();
   };
   for (;;) {
@@ -306,7 +306,7 @@ template <int D>
 bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watch) {
   Decomposition<D>& decomposition = system_->decomposition;
   const double diameter = info_.hard_cores && !system_->box.plain() ? 2 * largest_radius(*system_) : 0;
-  const auto cramped = [&](double after) {
+  const auto no_room_text = [&](double after) {
     system_->box.begin_step(slab.start, info_.stepping ? slab.length : 0);
     return diameter > 0 ? no_room(system_->box, diameter, after) : "";
   };
@@ -314,16 +314,16 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
     return Error(Failure::numerical,
                  what + " (in step " + std::to_string(slab.index + 1) + ", from time " + short_text(slab.start) + ")");
   };
-  // An epoch of free flight may end before the walls meet, after a given number of collisions.
-  if (const std::string what = info_.stepping ? cramped(slab.length) : ""; !what.empty()) throw error(what);
-  for (Counters before = report.counters;;) try {
+  // In free flight this is not checked here: the epoch may end after a number of collisions, before the walls meet.
+  if (const std::string what = info_.stepping ? no_room_text(slab.length) : ""; !what.empty()) throw error(what);
+  for (Counters before = report.counters;;) try {  // until it returns or throws
       watch.begin();
       system_->box.begin_step(slab.start, info_.stepping ? slab.length : 0);
       if (!system_->box.options.empty()) system_->box.check(Failure::numerical);
       check_rates(system_->box, slab, info_.stepping);
       if (ContactLaws& laws = system_->box.contacts; !laws.elastic()) {
         laws.thermal_speed = thermal_speed(*system_);
-        laws.slow = info_.stepping ? 0 : 1;
+        laws.restitution_when_slow = info_.stepping ? 0 : 1;
       }
       integrator_->slab(*system_, slab, report);
       return true;
@@ -339,11 +339,12 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
       return false;
     } catch (const Error& e) {
       if (e.failure() != Failure::numerical) throw;
-      std::string what = cramped(2 * slab.length);  // squeezed spheres collide ever faster before there is no room
-      for (const WallOptions<D>& each : system_->box.options)  // at the ends of oscillations
+      std::string what = no_room_text(2 * slab.length);  // squeezed spheres collide ever faster before there is no room
+      for (const WallOptions<D>& each : system_->box.options)  // a shaken wall is farthest out a quarter and three
+                                                               // quarters of a period after its phase is zero
         for (const double turns : {0.25, 0.75})
           if (const double left = turns - each.turns - each.frequency * slab.start; each.amplitude != 0 && what.empty())
-            what = cramped((left - std::floor(left)) / each.frequency);
+            what = no_room_text((left - std::floor(left)) / each.frequency);
       throw error(what.empty() ? e.what() : what);
     }
 }
@@ -352,7 +353,7 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
 template <int D>
 void Simulation<D>::act_of_bath(const Slab& slab, SlabReport<D>& report) {
   const Bath& bath = system_->box.bath;
-  const double start = clock_.time_of(slab.index), length = clock_.length_from(start);
+  const double start = clock_.time_after(slab.index), length = clock_.length_from(start);
   if (bath.rescales() && !(report.reached < slab.length))
     rescale(*system_, slab.index, start + length, length, report.counters);
   if (bath.kicks() && info_.stepping) kick_all(*system_, slab.start, slab.length, report.counters);

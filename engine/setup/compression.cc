@@ -23,7 +23,7 @@ template <int D>
 class Compressor {
  public:
   Compressor(const Box<D>& box, std::span<const double> radius, const CompressionOptions& options)
-      : box_(box), radius_(radius), options_(options), core_(box_, particles_) {
+      : box_(box), radius_(radius), options_(options), core_(box_) {
     for (WallOptions<D>& each : box_.options) {
       each.moved = each.displacement(0);
       each.velocity = each.amplitude = each.temperature = 0;
@@ -102,7 +102,7 @@ class Compressor {
       reached = core_.run(
           length, {.counters = counters, .collision_limit = std::min(counters.sphere_sphere + kBetweenPauses, limit)});
     } while (reached < length && counters.sphere_sphere < limit);
-    core_.fly_to(reached, particles_);
+    core_.copy_at(reached, particles_);
     for (std::size_t i = 0; i < particles_.size(); ++i) box_.wrap(particles_.x[i], particles_.image[i]);
     result_.factor = reached == to_the_end ? kTarget : result_.factor * (1 + growth * reached);
     scale_radii();

@@ -64,7 +64,7 @@ double default_epoch(const System<D>& system) {
   if (bath.rescales()) epoch = std::min(epoch, kEpochOfRelaxation / bath.rate);
   // The images of the fastest particles, also in equilibrium, must fit into a candidate on any number of ranks.
   const double speed = std::max(fastest, 5 * light_speed);
-  const Packing<D> packing(1, system.size());
+  const Packing<D> packing(1, system.size());  // largest() depends on the number of particles only
   for (int k = 0; k < D; ++k)
     if (system.box.periodic(k)) epoch = std::min(epoch, packing.largest() * system.box.edges[k] / speed);
   std::array<char, 32> text{};

@@ -33,7 +33,7 @@ ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events, s
       rest_(system.box, system.particles, reactions) {}
 
 template <int D>
-void ContactScan<D>::begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, const std::vector<Vec<D>>* a,
+void ContactScan<D>::begin_step(Counters& counters, std::vector<Contact<D>>* contacts, const std::vector<Vec<D>>* a,
                                 double length, SlabWatch* watch) {
   counters_ = &counters;
   contacts_ = contacts;
@@ -101,9 +101,9 @@ void ContactScan<D>::note_open() {
     if (!open(touch)) touched[touch.key.lo] = touched[touch.pair() ? touch.key.hi : touch.key.lo] = 1;
   for (Touch<D>& touch : touching_) {
     if (!open(touch)) continue;
-    touch.holds =
+    touch.may_be_held =
         rest_.kicks() || touch.force > 0 || touch.gap <= rest_.holding_gap(touch.key, touch.normal, touch.force);
-    touch.hits = touched[touch.key.lo] || (touch.pair() && touched[touch.key.hi]);
+    touch.may_hit = touched[touch.key.lo] || (touch.pair() && touched[touch.key.hi]);
   }
 }
 
@@ -115,7 +115,8 @@ void ContactScan<D>::sort_out(Positions<D> v, bool all_stop) {
   for (const Touch<D>& touch : touching_) {
     const double speed = normal_speed(touch, v), resting = resting_speed(touch, v);
     const bool fast = speed < -rest_.stopping_speed(touch.key, touch.normal, touch.force, resting);
-    if (!(fast ? touch.hits : speed < 0 || touch.holds)) continue;
+    // A fast contact must be allowed an impulse; a slow one that opens must be allowed to be held.
+    if (!(fast ? touch.may_hit : speed < 0 || touch.may_be_held)) continue;
     if (fast && !(all_stop && rest_.dissipates(touch.key)))
       approaching_.push_back(touch);
     else if (speed <= rest_.holding_speed(touch.key, touch.normal, touch.force, resting))
@@ -163,9 +164,9 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v, const 
     sort_out(v, all_stop);
     if (!approaching_.empty()) continue;
     if (resting_.empty()) return lost;
-    if (watch_) watch_->cut();
+    if (watch_) watch_->before_change();
     const bool dissipative = !box_.contacts.elastic();
-    const std::vector<Vec<D>> before(dissipative ? v.begin() : v.end(), v.end());
+    const std::vector<Vec<D>> before(dissipative ? v.begin() : v.end(), v.end());  // empty unless contacts dissipate
     lost += stop_rounding(v);
     if (dissipative) {  // a sphere that stops may approach another one that it was leaving
       std::vector<RestingContact<D>> all;
@@ -177,11 +178,13 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v, const 
     lost += stop_approach(x, v);
     if (dissipative) lost -= count_dissipated(before, v);
     sort_out(v, all_stop);  // a sphere that was stopped may have been moving away from another contact
-    const auto slow = [&](const Touch<D>& touch) {
+    // Another generation follows while a contact approaches faster than a resting one may, but not without end.
+    const auto still_approaches = [&](const Touch<D>& touch) {
       const double speed = normal_speed(touch, v);
-      return speed < -resting_speed(touch, v) && (touch.hits || speed >= -stopping_speed(touch, v));
+      return speed < -resting_speed(touch, v) && (touch.may_hit || speed >= -stopping_speed(touch, v));
     };
-    if (approaching_.empty() && !(dissipative && generation < 2 * kMostBounces && std::ranges::any_of(touching_, slow)))
+    if (approaching_.empty() &&
+        !(dissipative && generation < 2 * kMostBounces && std::ranges::any_of(touching_, still_approaches)))
       break;
     if (!approaching_.empty()) count_event(approaching_.front().key);
   }
@@ -202,7 +205,7 @@ void ContactScan<D>::one_by_one(std::uint32_t generation, Positions<D> x, Vector
                                           "sides and have no room to part; leave gaps between spheres that fill the "
                                           "space between walls, or a periodic box");
     count_event(touch.key);
-    if (watch_) watch_->cut();
+    if (watch_) watch_->before_change();
     const bool fixed = particles_.fixed(touch.key.lo);
     const Id moves = fixed ? touch.key.hi : touch.key.lo;
     const Vec<D> before = v[moves];
@@ -261,7 +264,8 @@ double ContactScan<D>::normal_slack(const RestingContact<D>& contact, Positions<
   return kFractionOfRounding * rounding_speed(contact.key, v) * contact.normal.norm();
 }
 
-/// Finds the reactions, starting from the last ones. A lambda of 1 along a normal of length 1 stands for `force`.
+/// Finds the reactions, starting from the last ones. `force`: the force for which lambda is 1 if the normal has
+/// length 1.
 template <int D>
 bool ContactScan<D>::press_apart(Vectors<D> w, double force) {
   for (auto& contact : resting_) contact.lambda = contact.force / (force * contact.normal.norm());
@@ -271,18 +275,19 @@ bool ContactScan<D>::press_apart(Vectors<D> w, double force) {
 }
 
 template <int D>
-void ContactScan<D>::hold(Positions<D> v, Vectors<D> a, double rest) {
+void ContactScan<D>::hold(Positions<D> v, Vectors<D> a, double time_left) {
   for (auto& contact : resting_) {
     contact.bound = contact.slack = 0;
     if (contact.key.kind != EventKind::pair) {
       contact.bound = box_.wall(contact.key.hi).acceleration;
       continue;
     }
-    // d·d − σ² = s² ((u² + d·a) + (u·a) s + ¼ a² s²) must not be negative up to `rest`. For a pair that turns (u) while
-    // it slows down (u·a < 0) the second term would cause an overlap; the reaction, normal to u, does not change u·a.
+    // d·d − σ² = s² ((u² + d·a) + (u·a) s + ¼ a² s²) must not be negative up to `time_left`. For a pair that turns (u)
+    // while it slows down (u·a < 0) the second term would cause an overlap; the reaction, normal to u, does not change
+    // u·a.
     const Vec<D> u = v[contact.key.lo] - v[contact.key.hi];
     const double braking = std::max(0.0, -u.dot(a[contact.key.lo] - a[contact.key.hi]));
-    contact.bound = braking * rest - u.squaredNorm();
+    contact.bound = braking * time_left - u.squaredNorm();
   }
   press_apart(a, 1);
   std::erase_if(resting_,
@@ -393,7 +398,7 @@ double ContactScan<D>::slide(Positions<D> x, Vectors<D> v, double later) {
 }
 
 template <int D>
-Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a, double rest) {
+Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a, double time_left) {
   const Stopwatch watch(counters_->seconds.predict);
   Touch<D> first;
   first.key.time = kNever;
@@ -402,7 +407,7 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
     fastest = std::max(fastest, v[i].squaredNorm());
     strongest = std::max(strongest, a[i].squaredNorm());
   }
-  const double path = rest * (std::sqrt(fastest) + 0.5 * rest * std::sqrt(strongest));
+  const double path = time_left * (std::sqrt(fastest) + 0.5 * time_left * std::sqrt(strongest));
   EventKey<D> key;
   auto offer = [&](const Vec<D>& normal) {
     // Only resting contacts are left at time 0; hold() has handled those under pressure.
@@ -415,7 +420,7 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
     key.hi = pair.j;
     key.image = pair.image;
     const bool touching = touches(d, sigma);
-    key.time = contact_time<D>(d, v[pair.i] - v[pair.j], a[pair.i] - a[pair.j], sigma, rest, touching,
+    key.time = contact_time<D>(d, v[pair.i] - v[pair.j], a[pair.i] - a[pair.j], sigma, time_left, touching,
                                touching ? sigma * rounding_speed(key, v) : 0.0);
     if (key.time < kNever) offer(d);
   }
@@ -427,7 +432,7 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
       const double radius = particles_.radius[i];
       key.lo = i;
       key.hi = wall.number;
-      key.time = wall_meeting<D>(wall, x[i], v[i], a[i], radius, 0, 0, rest, tolerance(radius),
+      key.time = wall_meeting<D>(wall, x[i], v[i], a[i], radius, 0, 0, time_left, tolerance(radius),
                                  [&] { return rounding_speed(key, v); });
       if (key.time < kNever) offer(wall.normal);
     }

@@ -24,11 +24,11 @@ template <int D>
 struct Touch {
   EventKey<D> key;  ///< key.time counts from now for a future contact
   Vec<D> normal;  ///< pair: x_lo − x_hi, acting on lo, and its negative on hi; wall: unit vector inwards, acting on lo
-  double speed = 0;   ///< velocity of a wall along its normal
-  double force = 0;   ///< the reaction of a present contact in the last piece [force]
-  double gap = 0;     ///< of a present contact [length]
-  bool holds = true;  ///< an open contact: whether the gap is so small that a slow contact is held
-  bool hits = true;   ///< an open contact: whether it gets an impulse at once, because a partner has a contact now
+  double speed = 0;         ///< velocity of a wall along its normal
+  double force = 0;         ///< the reaction of a present contact in the last piece [force]
+  double gap = 0;           ///< of a present contact [length]
+  bool may_be_held = true;  ///< an open contact: whether the gap is so small that a slow contact is held
+  bool may_hit = true;  ///< an open contact: whether it gets an impulse at once, because a partner has a contact now
   bool pair() const { return key.kind == EventKind::pair; }
 };
 
@@ -39,14 +39,14 @@ using ApplyImpulse = std::function<double(const Touch<D>&)>;
 template <int D>
 class ContactScan {
  public:
-  /// `max_events` limits the contacts of one slab. `reactions` are the reactions of the last piece; they are state of
+  /// `max_events` limits the contacts of one step. `reactions` are the reactions of the last piece; they are state of
   /// the run and must outlive the scan.
   ContactScan(const System<D>& system, std::uint64_t max_events, std::vector<Reaction<D>>& reactions);
 
-  /// Starts a slab of this length: counts from zero, and logs to `contacts` (may be null). `a` (may be null, or empty)
-  /// holds the accelerations that forces cause, without reactions; it must outlive the slab and may change within it.
+  /// Starts a step of this length: counts from zero, and logs to `contacts` (may be null). `a` (may be null, or empty)
+  /// holds the accelerations that forces cause, without reactions; it must outlive the step and may change within it.
   /// `watch` (may be null) is called before each impulse of resolve().
-  void begin_slab(Counters& counters, std::vector<Contact<D>>* contacts, const std::vector<Vec<D>>* a, double length,
+  void begin_step(Counters& counters, std::vector<Contact<D>>* contacts, const std::vector<Vec<D>>* a, double length,
                   SlabWatch* watch = nullptr);
 
   /// Applies `impulse`, which changes the velocities in `v`, to every contact that touches and approaches at x, in key
@@ -54,20 +54,20 @@ class ContactScan {
   /// they came to rest. Throws Error(Failure::numerical) beyond max_events.
   double resolve(double time, Positions<D> x, Vectors<D> v, const ApplyImpulse<D>& impulse);
 
-  /// Whether no contact approaches and no contact rests, at this time in the slab.
-  bool quiet(double time, Positions<D> x, Positions<D> v) {
+  /// Finds the contacts at this time in the step; returns whether one approaches or rests.
+  bool find_contacts(double time, Positions<D> x, Positions<D> v) {
     find_touching(time, x);
     sort_out(v);
-    return approaching_.empty() && resting_.empty();
+    return !approaching_.empty() || !resting_.empty();
   }
 
   /// The contacts that the last resolve() found at rest; none of them approaches any more.
   std::span<RestingContact<D>> resting() { return resting_; }
   bool rests(const EventKey<D>& key) const;
 
-  /// Keeps resting contacts from approaching for a time `rest`: adds the reactions to the accelerations a. Contacts
-  /// without a reaction no longer count as resting.
-  void hold(Positions<D> v, Vectors<D> a, double rest);
+  /// Keeps resting contacts from approaching for a time `time_left`: adds the reactions to the accelerations a.
+  /// Contacts without a reaction no longer count as resting.
+  void hold(Positions<D> v, Vectors<D> a, double time_left);
 
   /// Keeps resting contacts from approaching for the mean velocities w = v + ½ length a of a discrete-gradient piece
   /// from x, which ends at x + length · w_before. The reactions do no work, except where they correct a contact that
@@ -75,24 +75,24 @@ class ContactScan {
   /// found to rounding.
   bool hold_means(Positions<D> x, Positions<D> w_before, Vectors<D> w, double length);
 
-  /// Stops the approach of resting contacts at new positions; returns the energy that they lose. `kick`: the time in
-  /// which forces have caused this approach; the reactions are kept for remember() [time].
+  /// Stops the approach of resting contacts at new positions; returns the energy that they lose. `kick`: the length
+  /// of the kick that caused the approach [time], and the reactions are kept for remember(); 0: none is kept.
   double stop_approach(Positions<D> x, Vectors<D> v, double kick = 0);
 
   /// Drops resting contacts that have opened.
   void drop_open(Positions<D> x);
 
-  /// The first contact on the parabolas x + v s + a s²/2 within [0, rest); key.time is kNever when there is none.
+  /// The first contact on the parabolas x + v s + a s²/2 within [0, time_left); key.time is kNever when there is none.
   /// Call resolve() first; contacts held at rest are not searched for.
-  Touch<D> earliest(Positions<D> x, Positions<D> v, Positions<D> a, double rest);
+  Touch<D> earliest(Positions<D> x, Positions<D> v, Positions<D> a, double time_left);
 
-  /// Call this when a piece is accepted, before the box moves on: counts the work of moving walls on spheres at rest on
-  /// them, whose reactions have acted for this length of time, and the next solve starts from these reactions.
+  /// Call this when a piece of this length [time] is accepted, before the box moves on. It counts the work of moving
+  /// walls on spheres at rest on them and stores the reactions, from which the next solve starts.
   void remember(double length);
 
   /// Makes the velocities of contacts that were held over a piece tangential at its end, x, and conserves their energy
   /// (the normal velocity that a held piece of finite length leaves would make the pair bounce at once). Returns the
-  /// energy that is missing afterwards. The box is at a time that is `later` at the end of the piece.
+  /// energy that is missing afterwards. The piece ends `later` after the present time of the box.
   double slide(Positions<D> x, Vectors<D> v, double later = 0);
 
   /// The candidate pairs, for methods that search for contacts themselves.
@@ -120,10 +120,10 @@ class ContactScan {
     return walls_;
   }
 
-  /// Counts one more contact or piece of length zero; throws if the slab needs more than max_events.
+  /// Counts one more contact or piece of length zero; throws if the step needs more than max_events.
   void count_event(const EventKey<D>& key);
 
-  /// Counts and logs contacts that the caller has found and executed; their times count from `time` in the slab.
+  /// Counts and logs contacts that the caller has found and executed; their times count from `time` in the step.
   void commit(double time, std::span<const Contact<D>> executed);
 
   /// See RestCriterion::rounding_speed.
@@ -176,7 +176,7 @@ class ContactScan {
   Counters* counters_ = nullptr;
   std::vector<Contact<D>>* contacts_ = nullptr;
   SlabWatch* watch_ = nullptr;
-  double widest_ = 0;  // gap of an open contact in touching_
+  double widest_ = 0;  // the largest gap with which a contact is put into touching_
   std::vector<Reaction<D>>& reactions_;
   RestCriterion<D> rest_;
   std::vector<Touch<D>> touching_, approaching_;

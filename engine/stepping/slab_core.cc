@@ -43,7 +43,8 @@ template <int D>
 void SlabCore<D>::release() {
   scan_.reset();
   const auto free = [](auto&... vectors) { (std::remove_reference_t<decltype(vectors)>().swap(vectors), ...); };
-  free(near_, reach_, largest_bend_, held_, x_, last_x_, v_, moved_, slot_, flights_, sequences_, last_sequences_);
+  free(near_, longest_path_of_, largest_bend_, held_, x_, last_x_, v_, moved_, slot_, flights_, sequences_,
+       last_sequences_);
 }
 
 template <int D>
@@ -57,7 +58,7 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
   last_sequences_.clear();
   sequences_.clear();
   const std::size_t n = particles_.size();
-  for (auto* each : {&largest_bend_, &reach_}) each->resize(n);
+  for (auto* each : {&largest_bend_, &longest_path_of_}) each->resize(n);
   for (auto* each : {&x_, &last_x_, &v_}) each->resize(n, Vec<D>::Zero());
   moved_.resize(n);
   held_.assign(scan_->resting().empty() ? 0 : n, 0);
@@ -65,23 +66,24 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
     held_[contact.key.lo] = 1;
     if (contact.key.kind == EventKind::pair) held_[contact.key.hi] = 1;
   }
-  margin_ = own_reach_ = 0;
+  margin_ = own_longest_path_ = 0;
   for (Id i = 0; i < n; ++i) {
     const double straight = length * v[i].norm(), bent = 0.5 * length * length * acceleration(i).norm();
-    reach_[i] = kPathMargin * (straight + bent);
-    margin_ = bent <= most_bend_ ? std::max(margin_, reach_[i]) : kNever;
-    if (particles_.owns(i)) own_reach_ = std::max(own_reach_, reach_[i]);
+    longest_path_of_[i] = kPathMargin * (straight + bent);
+    margin_ = bent <= most_bend_ ? std::max(margin_, longest_path_of_[i]) : kNever;
+    if (particles_.owns(i)) own_longest_path_ = std::max(own_longest_path_, longest_path_of_[i]);
     largest_bend_[i] = (kPathMargin - 1) * straight + kPathMargin * bent;
   }
   near_.clear();
-  limit_margin();
+  reject_wide_margin();
   if (std::isfinite(margin_)) find_near();
 }
 
-/// Rejects accelerations under which a parabola may be longer than a quarter of a periodic box, so that two particles
-/// may approach each other by more than half of it: beyond that each pair has several images within reach.
+/// Makes margin_ infinite, which rejects the flight, under accelerations for which a parabola may be longer than a
+/// quarter of a periodic box, so that two particles may approach each other by more than half of it: beyond that each
+/// pair has several images within reach.
 template <int D>
-void SlabCore<D>::limit_margin() {
+void SlabCore<D>::reject_wide_margin() {
   for (int k = 0; k < D; ++k)
     if (box_.periodic(k) && !a_.empty() && margin_ > 0.25 * box_.edges[k]) margin_ = kNever;
 }
@@ -95,7 +97,7 @@ void SlabCore<D>::find_near() {
   for (std::uint32_t k = 0; k < pairs_.size(); ++k) {
     const auto& [i, j, image] = pairs_[k];
     const double sigma = scan_->contact_distance(i, j), touching = sigma + scan_->tolerance(sigma);
-    const double near = touching + reach_[i] + reach_[j];
+    const double near = touching + longest_path_of_[i] + longest_path_of_[j];
     const Vec<D> d = x[i] - x[j] + box_.shift(image);
     if (!(d.squaredNorm() <= near * near)) continue;
     // Each path bends off its straight line by no more than largest_bend_.
@@ -126,7 +128,7 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
     }
     if (!left_ && longest_path_ > 0 && std::isfinite(longest_path_)) {
       margin_ = kPathMargin * longest_path_;
-      limit_margin();
+      reject_wide_margin();
       if (std::isfinite(margin_))
         find_near();
       else
@@ -134,19 +136,19 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
     }
   } while (!left_ && longest_path_ > 0 && std::isfinite(longest_path_));
   for (const Flight& each : flights_) {
-    const double rest = length_ - each.t;
+    const double time_left = length_ - each.t;
     const Vec<D> a_i = acceleration(each.id);
-    x_[each.id] = each.x + rest * each.v + (0.5 * rest * rest) * a_i;
-    v_[each.id] = each.v + rest * a_i;
+    x_[each.id] = each.x + time_left * each.v + (0.5 * time_left * time_left) * a_i;
+    v_[each.id] = each.v + time_left * a_i;
   }
-  const bool shared = !system_.decomposition.knows_all();
+  const bool divided = !system_.decomposition.knows_all();
   all_moved_ = 0;
   for (Id i = 0; i < x_.size(); ++i) {
     moved_[i] = x_[i] != last_x_[i];
-    if (!shared || particles_.owns(i)) all_moved_ += moved_[i];
+    if (!divided || particles_.owns(i)) all_moved_ += moved_[i];
   }
-  if (!shared && (system_.decomposition.joined() ? system_.decomposition.any(left_) : left_)) throw SlabLeft{};
-  if (shared)
+  if (!divided && (system_.decomposition.joined() ? system_.decomposition.any(left_) : left_)) throw SlabLeft{};
+  if (divided)
     compare_ranks(!end.complete || too_many_contacts_ || longest_path_ > 0);
   else if (too_many_contacts_)
     throw_too_many_contacts(max_events_, partners(end.key, box_));
@@ -154,7 +156,7 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
     return {.complete = false, .too_strong = true};
   else if (longest_path_ > 0) {
     Id i = 0;
-    while (i + 1 < x_.size() && std::isfinite(reach_[i]) && x_[i].allFinite()) ++i;
+    while (i + 1 < x_.size() && std::isfinite(longest_path_of_[i]) && x_[i].allFinite()) ++i;
     throw Error(Failure::numerical, "the position or velocity of particle " + std::to_string(particles_.id_of(i)) +
                                         " is not finite; use a smaller integrator.step");
   }
@@ -198,7 +200,7 @@ void SlabCore<D>::plain_ends() {
       note_path(half * a_[i].norm() <= most_bend_ ? far : kNever);
 }
 
-/// Handles the events of the queue until it is empty.
+/// Handles the events of the queue until it is empty or an event ends the flight.
 template <int D>
 FlightEnd<D> SlabCore<D>::serve() {
   for (std::size_t served = 1; !queue_.empty() && longest_path_ == 0; ++served) {
@@ -212,12 +214,12 @@ FlightEnd<D> SlabCore<D>::serve() {
     const EventKey<D>& key = event.key;
     const bool pair = key.kind == EventKind::pair;
     if (event.version_lo != version(key.lo) || (pair && event.version_hi != version(key.hi))) continue;
-    if (resolved_ && !(key.time > 0)) continue;  // rounding
+    if (resolved_ && !(key.time > 0)) continue;  // resolve() has handled these; what is found again is rounding
     if (!box_.contacts.elastic() && at_the_end(key)) continue;
     const bool held = !held_.empty() && (held_[key.lo] != 0 || (pair && held_[key.hi] != 0));
     // A straight flight presses no spheres together: elastic contacts that do not approach need no impulse.
     if (held || ((!a_.empty() || !box_.contacts.elastic()) && comes_to_rest(key))) {
-      if (falls_back(key)) return {.complete = false, .key = key, .falls_back = true};
+      if (falls_back(key)) return {.complete = false, .key = key};
       return {.complete = false, .time = box_.contacts.elastic() ? key.time : end_before(key), .key = key};
     }
     const std::uint32_t most = std::max(version(key.lo), pair ? version(key.hi) : 0);
@@ -259,13 +261,13 @@ void SlabCore<D>::predict_all(Id i) {
 /// Predicts the next contact of the present flights, from the later of their starts.
 template <int D>
 void SlabCore<D>::predict_pair(Id i, Id j, const Image<D>& image) {
-  const double t = std::max(start(i), start(j)), sigma = scan_->contact_distance(i, j), rest = length_ - t;
+  const double t = std::max(start(i), start(j)), sigma = scan_->contact_distance(i, j), time_left = length_ - t;
   const Vec<D> d = position(i, t) - position(j, t) + box_.shift(image);
   const Vec<D> v_i = velocity(i, t), v_j = velocity(j, t), v = v_i - v_j;
   const bool touching = scan_->touches(d, sigma);
   const double slack = touching ? sigma * (scan_->rounding_speed(i, v_i) + scan_->rounding_speed(j, v_j)) : 0.0;
   const double s = a_.empty() ? contact_time<D>(d, v, sigma, slack)
-                              : contact_time<D>(d, v, a_[i] - a_[j], sigma, rest, touching, slack);
+                              : contact_time<D>(d, v, a_[i] - a_[j], sigma, time_left, touching, slack);
   if (!(t + s < length_)) return;
   EventKey<D> key{.time = t + s, .kind = EventKind::pair, .lo = i, .hi = j, .image = image};
   if (!held_.empty() && scan_->rests(key)) return;
@@ -337,11 +339,11 @@ template <int D>
 bool SlabCore<D>::at_the_end(const EventKey<D>& key) const {
   const bool pair = key.kind == EventKind::pair;
   const Meeting meeting(*this, key);
-  const double most = 0.25 * scan_->tolerance(meeting.sigma), rest = length_ - key.time;
+  const double most = 0.25 * scan_->tolerance(meeting.sigma), time_left = length_ - key.time;
   const Vec<D> a = acceleration(key.lo);
-  const double opening =
+  const double gap_acceleration =
       pair ? meeting.normal.dot(a - acceleration(key.hi)) / meeting.normal.norm() : box_.wall(key.hi).speeding(a);
-  if (rest * (0.5 * rest * std::max(0.0, -opening) - meeting.speed) > most) return false;
+  if (time_left * (0.5 * time_left * std::max(0.0, -gap_acceleration) - meeting.speed) > most) return false;
   EventKey<D> at_end = key;
   at_end.time = length_;
   if (pair) return Meeting(*this, at_end).normal.norm() - meeting.sigma >= -most;
@@ -444,23 +446,23 @@ void SlabCore<D>::compare_sequences() {
     if (swapped_.empty() || swapped_.back() != each.id) swapped_.push_back(each.id);
 }
 
-/// Copies get the ends of their originals' flights. Throws on all ranks: SlabLeft if one of them was asked to stop;
-/// HaloTooSmall if a flight failed on one of them, if a relevant copy had other events than its original, or if a path
-/// was longer than the halo allows. Collective.
+/// Ghosts get the end points that their owners computed. Throws on all ranks: SlabLeft if one of them was asked to
+/// stop; HaloTooSmall if a flight failed on one of them, if a ghost that matters had other events than on its owner, or
+/// if a path was longer than the halo allows. Collective.
 template <int D>
 void SlabCore<D>::compare_ranks(bool failed) {
   Decomposition<D>& decomposition = system_.decomposition;
   PathHashes<D> events(particles_);
   for (const Contact<D>& contact : contacts_) events.add(contact.key);
   std::vector<std::uint64_t> at_owners = events.words();
-  decomposition.update(std::span(at_owners), std::span(x_));
+  decomposition.copy_to_ghosts(std::span(at_owners), std::span(x_));
   bool equal = true;
   for (Id i = 0; i < at_owners.size(); ++i) {
     if (particles_.owns(i)) continue;
     moved_[i] = x_[i] != last_x_[i];
     if (at_owners[i] != events.words()[i] && decomposition.matters(i)) equal = false;
   }
-  std::array<double, 4> most = {failed ? 1.0 : 0.0, equal ? 0.0 : 1.0, own_reach_, left_ ? 1.0 : 0.0};
+  std::array<double, 4> most = {failed ? 1.0 : 0.0, equal ? 0.0 : 1.0, own_longest_path_, left_ ? 1.0 : 0.0};
   auto& [any_failed, any_wrong, farthest, any_left] = most;
   for (const Id i : beyond_)
     if (particles_.owns(i)) farthest = std::max(farthest, path(start_v_[i], a_[i], length_));
@@ -479,7 +481,7 @@ void SlabCore<D>::commit(double time) {
   if (system_.decomposition.knows_all())
     scan_->commit(time, contacts_);
   else if (!commit_contacts<D>(system_, contacts_, max_events_, *counters_, log_))
-    throw HaloTooSmall{};  // with all particles known the error can name them
+    throw HaloTooSmall{};  // the step is repeated with all particles on each rank, and then the error names them
 }
 
 template class SlabCore<2>;

@@ -11,8 +11,8 @@
 // function of two flights alone, so the bits depend on neither the list, nor the order, nor the rank.
 //
 // Where each rank knows only some of the particles (engine/ranks/decomposition.h), ranks compare their flights: owners
-// send a hash of the events of each particle that other ranks have a copy of. If a relevant copy had other events than
-// its original, or a path was longer than the halo allows, fly() throws HaloTooSmall on all ranks; the system is
+// send a hash of the events of each particle that are ghosts on other ranks. If a ghost that matters had other events
+// than there, or a path was longer than the halo allows, fly() throws HaloTooSmall on all ranks; the system is
 // unchanged then.
 
 #include <algorithm>
@@ -28,12 +28,14 @@ namespace carom {
 template <int D>
 struct FlightEnd {
   bool complete = true;
-  bool too_strong = false;  ///< if incomplete: an acceleration bends paths far too much for the slab, or is NaN, or
-                            ///< there are so many contacts that the end of the flight would be meaningless
-  double time = 0;          ///< if incomplete for another reason: the slab must end here, because a contact comes to
-                    ///< rest or a resting one is hit; the spheres touch then, with a gap that leaves room for rounding
-  EventKey<D> key{};        ///< the event that made the flight incomplete
-  bool falls_back = false;  ///< it is a contact that has opened by less than a contact at rest may
+  /// If incomplete: an acceleration bends paths far too much for the piece, or is NaN, or there are so many contacts
+  /// that the end of the flight would be meaningless. If not set, the piece must end at `time`, because a contact comes
+  /// to rest or a resting one is hit.
+  bool too_strong = false;
+  /// When that event happens; the spheres touch then, with a gap that leaves room for rounding. 0: at the start of the
+  /// piece, where the contacts must be resolved again.
+  double time = 0;
+  EventKey<D> key{};  ///< the event that made the flight incomplete
 };
 
 template <int D>
@@ -45,14 +47,14 @@ class SlabCore {
   SlabCore(const SlabCore&) = delete;
   SlabCore& operator=(const SlabCore&) = delete;
 
-  /// Starts a step; see ContactScan::begin_slab. fly() calls `watch` too.
+  /// Starts a step; see ContactScan::begin_step. fly() calls `watch` too.
   void begin_step(Counters& counters, std::vector<Contact<D>>* contacts, const std::vector<Vec<D>>* a, double length,
                   SlabWatch* watch = nullptr) {
     counters_ = &counters;
     log_ = contacts;
     watch_ = watch;
     if (!reactions_.empty()) system_.decomposition.need_all();
-    scan_->begin_slab(counters, contacts, a, length, watch);
+    scan_->begin_step(counters, contacts, a, length, watch);
   }
 
   /// Finds the pairs that may meet in a slab of this length [time], from the system's positions with velocities v,
@@ -117,7 +119,7 @@ class SlabCore {
   struct Meeting;
   void release();
   void find_near();
-  void limit_margin();
+  void reject_wide_margin();
   void plain_ends();
   void predict_first();
   FlightEnd<D> serve();
@@ -156,17 +158,19 @@ class SlabCore {
   Counters* counters_ = nullptr;
   std::vector<Contact<D>>* log_ = nullptr;
   SlabWatch* watch_ = nullptr;
-  double length_ = 0, margin_ = 0, own_reach_ = 0;
-  double longest_path_ = 0;  // the longest path of this flight that exceeds margin_; 0: none
+  double length_ = 0;
+  double margin_ = 0;  // pairs_ has all pairs whose two paths are at most this long; infinite: the flight is rejected
+  double own_longest_path_ = 0;
+  double longest_path_ = 0;  // the longest path of this flight that exceeds margin_; 0: none; infinite: rejected
   bool too_many_contacts_ = false, resolved_ = false;
   bool left_ = false;         // this rank was asked to stop during this flight
   Positions<D> start_v_, a_;  // velocities at the slab's start, accelerations
   std::span<const NeighbourPair<D>> pairs_;
-  std::vector<std::uint32_t> near_;   // indices of the pairs that may meet before any other collision
-  std::vector<double> reach_;         // by particle: the longest path for which `near_` is complete
-  std::vector<double> largest_bend_;  // by particle: the largest |½ a h²| for which `near_` is complete
-  std::vector<Id> beyond_;            // particles with a larger |½ a h²|
-  std::vector<char> held_;            // by particle: has a resting contact; empty: none has
+  std::vector<std::uint32_t> near_;      // indices of the pairs that may meet before any other collision
+  std::vector<double> longest_path_of_;  // by particle: the longest path for which `near_` is complete
+  std::vector<double> largest_bend_;     // by particle: the largest |½ a h²| for which `near_` is complete
+  std::vector<Id> beyond_;               // particles with a larger |½ a h²|
+  std::vector<char> held_;               // by particle: has a resting contact; empty: none has
   std::vector<Vec<D>> x_, last_x_, v_;
   std::vector<char> moved_;
   std::uint64_t all_moved_ = 0;

@@ -2,9 +2,10 @@
 #pragma once
 // Lets a run stop within a long step and restores the state at the start of the step.
 //
-// Between pieces, sweeps and contacts an integrator calls cut() or look(), which throw SlabLeft on all ranks together
-// if the run is to stop. The first cut() of a slab copies the state, so a slab that is not cut costs no copy. Within a
-// slab only registered state changes: that of the particles, and that which the integrator has registered for the run.
+// Between pieces, sweeps and contacts an integrator calls before_change() or look(), which throw SlabLeft on all ranks
+// together if the run is to stop. The first before_change() of a slab copies the state, so a slab without one costs no
+// copy. Within a slab only registered state changes: that of the particles, and that which the integrator has
+// registered for the run.
 
 #include <cstring>
 #include <functional>
@@ -28,7 +29,7 @@ class SlabWatch {
   // Functions that integrators call.
 
   /// Call this before the system changes within a slab: copies the state at its start once, then look(). Collective.
-  void cut() {
+  void before_change() {
     if (!kept_ && leave_) keep();
     look();
   }

@@ -118,7 +118,7 @@ template <int D>
 void expect_same_events(const System<D>& system, const Vec<D>& g, double end, std::size_t at_least) {
   Counters counters;
   std::vector<Contact<D>> contacts;
-  EventCore<D> core(system.box, system.particles);
+  EventCore<D> core(system.box);
   core.load(system.particles, g, end);
   core.run(end, {.counters = counters, .contacts = &contacts});
   const auto obvious = obvious_run<D>(system.box, system.particles, g, end);
@@ -180,7 +180,7 @@ TEST(EventCore, TwoSpheresInADiluteBoxMeetThroughAFarImage) {
   auto system = test::make_system<2>({40, 40}, P, {{10, 20}, {12, 20}}, {{-1, 0}, {1, 0}});
   Counters counters;
   std::vector<Contact<2>> contacts;
-  EventCore<2> core(system->box, system->particles);
+  EventCore<2> core(system->box);
   core.load(system->particles, Vec<2>::Zero(), 50);
   core.run(50, {.counters = counters, .contacts = &contacts});
   ASSERT_GE(contacts.size(), 1u);
@@ -193,15 +193,15 @@ TEST(EventCore, StoppingOnTheWayChangesNothing) {
   const double end = 2;
   auto records = [&](const std::vector<double>& stops) {
     Counters counters;
-    EventCore<3> core(system->box, system->particles);
+    EventCore<3> core(system->box);
     core.load(system->particles, Vec<3>::Zero(), end);
     Particles<3> copies = system->particles;
     for (double stop : stops) {
       core.run(stop, {.counters = counters});
-      core.fly_to(stop, copies);
+      core.copy_at(stop, copies);
     }
     core.run(end, {.counters = counters});
-    core.fly_to(end, copies);
+    core.copy_at(end, copies);
     EXPECT_GT(counters.sphere_sphere, 300u);
     return copies;
   };
@@ -217,11 +217,11 @@ TEST(EventCore, RadiiMayChangeBetweenSlabs) {  // equal and unequal radii: no ol
     for (std::size_t i = 0; i < p.size(); ++i)
       if (!equal && i % 2 == 1) p.radius[i] = 0.4;
     const SearchOptions lists{.method = SearchOptions::Method::lists, .skin = 0.05};
-    EventCore<3> kept(system->box, p, lists);
+    EventCore<3> kept(system->box, lists);
     kept.load(p, Vec<3>::Zero(), 1);
     for (double& r : p.radius) r *= 1.3;
     std::vector<std::vector<Contact<3>>> contacts(2);
-    EventCore<3> fresh(system->box, p, lists);
+    EventCore<3> fresh(system->box, lists);
     for (EventCore<3>* core : {&kept, &fresh}) {
       Counters counters;
       core->load(p, Vec<3>::Zero(), 1);
@@ -238,7 +238,7 @@ TEST(EventCore, StopsAtTheCollisionLimit) {
   auto system = test::hard_spheres<2>(6, 0.5);
   Counters counters;
   std::vector<Contact<2>> contacts;
-  EventCore<2> core(system->box, system->particles);
+  EventCore<2> core(system->box);
   core.load(system->particles, Vec<2>::Zero(), 10);
   const double reached = core.run(10, {.counters = counters, .contacts = &contacts, .collision_limit = 123});
   EXPECT_EQ(counters.sphere_sphere, 123u);
@@ -256,7 +256,7 @@ TEST(EventCore, SimultaneousCollisionsOfALatticeKeepTheirOrder) {
   auto system = test::make_system<2>({12, 12}, P, x, v);
   Counters counters;
   std::vector<Contact<2>> contacts;
-  EventCore<2> core(system->box, system->particles);
+  EventCore<2> core(system->box);
   core.load(system->particles, Vec<2>::Zero(), 5);
   core.run(5, {.counters = counters, .contacts = &contacts});
   ASSERT_EQ(contacts.size() % 32, 0u);
@@ -287,13 +287,13 @@ TEST(EventCore, GrowingSpheresNeverOverlap) {
     constexpr int D = std::decay_t<decltype(system->box.edges)>::RowsAtCompileTime;
     Counters counters;
     std::vector<Contact<D>> contacts;
-    EventCore<D> core(system->box, system->particles);
+    EventCore<D> core(system->box);
     core.load(system->particles, Vec<D>::Zero(), end, growth);
     Particles<D> copies = system->particles;
     for (int stop = 1; stop <= 50; ++stop) {
       const double time = end * stop / 50;
       core.run(time, {.counters = counters, .contacts = &contacts});
-      core.fly_to(time, copies);
+      core.copy_at(time, copies);
       EXPECT_GT(smallest_gap<D>(*system, copies, 1 + growth * time), -1e-12) << "time " << time;
     }
     EXPECT_GT(counters.sphere_sphere, 20u);
@@ -324,14 +324,14 @@ TEST(EventCore, GrowthPushesRestingSpheresApartAndOffTheWalls) {
   // Two discs at rest, each 1 from a wall and of radius 0.5 (1 + growth·t).
   auto system = test::make_system<2>({5, 9}, W, {{1, 4.5}, {4, 4.5}}, {{0, 0}, {0, 0}});
   Counters counters;
-  EventCore<2> core(system->box, system->particles);
+  EventCore<2> core(system->box);
   core.load(system->particles, Vec<2>::Zero(), 1.2, 0.1);
   Particles<2> p = system->particles;
   core.run(1.2, {.counters = counters});
   EXPECT_EQ(counters.sphere_sphere + counters.sphere_wall, 0u);
   core.load(system->particles, Vec<2>::Zero(), 1.2, 1.0);
   core.run(1.2, {.counters = counters});
-  core.fly_to(1.2, p);
+  core.copy_at(1.2, p);
   EXPECT_EQ(counters.sphere_wall, 2u);
   EXPECT_DOUBLE_EQ(p.v[0][0], 1.0);  // twice the rate of the radius
   EXPECT_DOUBLE_EQ(p.v[1][0], -1.0);
@@ -342,7 +342,7 @@ TEST(EventCore, GrowthPushesRestingSpheresApartAndOffTheWalls) {
   EventCore<2> other(pair->box, pair->particles);
   other.load(pair->particles, Vec<2>::Zero(), 1.2, 1.0);
   other.run(1.2, {.counters = counters});
-  other.fly_to(1.2, p);
+  other.copy_at(1.2, p);
   EXPECT_EQ(counters.sphere_sphere, 1u);
   EXPECT_DOUBLE_EQ(p.v[0][0], -1.0);
   EXPECT_DOUBLE_EQ(p.v[1][0], 1.0);
@@ -353,11 +353,11 @@ TEST(EventCore, NewtonsCradlePassesTheBlowThroughAChainInContact) {
                                      {{1, 0}, {0, 0}, {0, 0}, {0, 0}, {0, 0}});
   Counters counters;
   std::vector<Contact<2>> contacts;
-  EventCore<2> core(system->box, system->particles);
+  EventCore<2> core(system->box);
   core.load(system->particles, Vec<2>::Zero(), 5);
   core.run(5, {.counters = counters, .contacts = &contacts});
   Particles<2> p = system->particles;
-  core.fly_to(5, p);
+  core.copy_at(5, p);
   ASSERT_EQ(contacts.size(), 4u);
   for (std::uint32_t k = 0; k < 4; ++k) {
     EXPECT_EQ(contacts[k].key.time, 3.0);
@@ -371,7 +371,7 @@ TEST(EventCore, NewtonsCradlePassesTheBlowThroughAChainInContact) {
 
 TEST(EventCore, ASphereAtRestOnAWallUnderAFieldIsAnErrorThatNamesIt) {
   auto system = test::make_system<2>({4, 4}, W, {{2, 0.5}}, {{0.3, 0}});
-  EventCore<2> core(system->box, system->particles);
+  EventCore<2> core(system->box);
   try {
     core.load(system->particles, Vec<2>(0, -1), 1);
     FAIL() << "no error";
@@ -384,7 +384,7 @@ TEST(EventCore, ASphereAtRestOnAWallUnderAFieldIsAnErrorThatNamesIt) {
 TEST(EventCore, MoreEventsThanAllowedIsAnErrorThatNamesThePair) {
   auto system = test::make_system<2>({6, 4}, W, {{1, 2}, {3, 2}}, {{1, 0}, {-1, 0}});
   Counters counters;
-  EventCore<2> core(system->box, system->particles);
+  EventCore<2> core(system->box);
   core.load(system->particles, Vec<2>::Zero(), 100);
   EXPECT_THROW(core.run(100, {.counters = counters, .max_events = 10}), Error);
 }

@@ -23,7 +23,7 @@ struct Approach {
     Counters counters;
     std::vector<Reaction<2>> reactions;
     ContactScan<2> scan(*system, 100, reactions);
-    scan.begin_slab(counters, nullptr, nullptr, 1.0);
+    scan.begin_step(counters, nullptr, nullptr, 1.0);
     DiscreteGradient<2> piece(*system, 2);
     EXPECT_TRUE(piece.solve(x, v, 1.0, scan, counters));
     end = ChordContacts<2>(*system, scan).judge(x, v, piece, 1.0);

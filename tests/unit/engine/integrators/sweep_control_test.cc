@@ -64,12 +64,12 @@ TEST(SweepControl, IsSlowWhereTwoSweepsContractLittle) {
 TEST(SweepControl, EndsAfterSixtySweepsAndFreezesFromTheSixthOn) {
   SweepControl control(0);
   for (int sweep = 1; sweep <= 60; ++sweep) {
-    EXPECT_TRUE(control.more());
+    EXPECT_TRUE(control.below_limit());
     control.note(1, kRounding);
     EXPECT_EQ(control.sweep(), sweep);
     EXPECT_EQ(control.may_freeze(), sweep >= 6);
   }
-  EXPECT_FALSE(control.more());
+  EXPECT_FALSE(control.below_limit());
 }
 
 }  // namespace

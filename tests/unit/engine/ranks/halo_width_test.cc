@@ -31,10 +31,10 @@ TEST(HaloWidth, AllowsForPathsThatWereTooLongUntilThatIsLongAgo) {
   const double first = width.near();
   EXPECT_TRUE(width.allows(1.5 * kPath));
   EXPECT_FALSE(width.allows(5 * kPath));
-  EXPECT_FALSE(width.asked());
+  EXPECT_FALSE(width.take_request());
   width.ask_for_path(5 * kPath);
-  EXPECT_TRUE(width.asked());
-  EXPECT_FALSE(width.asked());
+  EXPECT_TRUE(width.take_request());
+  EXPECT_FALSE(width.take_request());
   width.fit(kReach, kPath, kDiameter);
   EXPECT_TRUE(width.allows(5 * kPath));
   EXPECT_GT(width.near(), first);
@@ -42,14 +42,14 @@ TEST(HaloWidth, AllowsForPathsThatWereTooLongUntilThatIsLongAgo) {
   width.fit(kReach, kPath, kDiameter);
   EXPECT_EQ(width.near(), first);
   width.ask_for_path(std::numeric_limits<double>::infinity());
-  EXPECT_FALSE(width.asked());  // no width is sufficient
+  EXPECT_FALSE(width.take_request());  // no width is sufficient
 }
 
 TEST(HaloWidth, GrowsDeeperWhereCopiesWentWrong) {
   HaloWidth width = fitted(true);
   const double depth = width.far() - width.near();
   width.ask_for_depth();
-  EXPECT_TRUE(width.asked());
+  EXPECT_TRUE(width.take_request());
   width.fit(kReach, kPath, kDiameter);
   EXPECT_DOUBLE_EQ(width.far() - width.near(), 2 * depth);
   for (int k = 0; k < 10; ++k) width.relax();

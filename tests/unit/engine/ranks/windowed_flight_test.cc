@@ -30,13 +30,13 @@ Outcome<D> whole(const Case<D>& c, std::uint64_t limit = std::numeric_limits<std
   out.particles = c.system->particles;
   Particles<D>& p = out.particles;
   Box<D> box = c.system->box;
-  EventCore<D> core(box, p);
+  EventCore<D> core(box);
   Counters counters;
   for (int k = 0; k < c.slabs && counters.sphere_sphere < limit; ++k) {
     core.load(p, c.g, c.slab);
     const double reached = core.run(
         c.slab, {.counters = counters, .contacts = &out.contacts, .collision_limit = limit, .contact_limit = contacts});
-    core.fly_to(reached, p);
+    core.copy_at(reached, p);
     for (std::size_t i = 0; i < p.size(); ++i) box.wrap(p.x[i], p.image[i]);
     box.time += reached;
   }
@@ -171,7 +171,7 @@ TEST(WindowedFlight, SpheresFarFromTheirRegion) {
       Particles<3>& p = system->particles;
       Counters counters;
       std::vector<Contact<3>> all, here;
-      EventCore<3> whole(system->box, p);
+      EventCore<3> whole(system->box);
       whole.load(p, Vec<3>::Zero(), 20);
       whole.run(20, {.counters = counters, .contacts = &all});
       Sizes sizes(p);

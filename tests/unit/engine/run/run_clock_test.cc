@@ -84,7 +84,7 @@ TEST(RunClock, ARunThatGoesOnCountsFromTheShortenedStep) {
   const Slab next = run.clock.next_slab(run.s);
   EXPECT_EQ(next.start, 0.25);
   EXPECT_EQ(next.length, 0.1);
-  EXPECT_EQ(run.clock.time_of(4), 0.25 + 0.1);
+  EXPECT_EQ(run.clock.time_after(4), 0.25 + 0.1);
 }
 
 TEST(RunClock, OnTheWayOfALongerRunAreWholeStepsOnly) {

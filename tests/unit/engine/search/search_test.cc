@@ -32,12 +32,12 @@ Outcome<D> run(const Case<D>& c, const SearchOptions& options, const char* simd 
   Outcome<D> trace;
   trace.particles = c.system->particles;
   Particles<D>& p = trace.particles;
-  EventCore<D> core(c.system->box, p, options);
+  EventCore<D> core(c.system->box, options);
   Counters counters;
   for (int k = 0; k < c.slabs; ++k) {
     core.load(p, c.g, c.slab, c.growth);
     core.run(c.slab, {.counters = counters, .contacts = &trace.contacts});
-    core.fly_to(c.slab, p);
+    core.copy_at(c.slab, p);
     for (std::size_t i = 0; i < p.size(); ++i) c.system->box.wrap(p.x[i], p.image[i]);
     for (double& r : p.radius) r *= 1 + c.growth * c.slab;
   }

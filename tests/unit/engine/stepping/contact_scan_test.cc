@@ -20,7 +20,7 @@ struct Scene {
       : system(test::make_system<2>({20, 6}, Boundary::wall, x, v)),
         a(std::move(acceleration)),
         scan(*system, max_events, reactions) {
-    scan.begin_slab(counters, &contacts, &a, 1.0);
+    scan.begin_step(counters, &contacts, &a, 1.0);
   }
   void resolve() {
     auto& p = system->particles;
@@ -73,7 +73,7 @@ TEST(ContactScan, LeavesAPairThatAnEarlierImpulseHasParted) {
   Counters counters;
   std::vector<Reaction<2>> reactions;
   ContactScan<2> scan(*system, 100, reactions);
-  scan.begin_slab(counters, nullptr, nullptr, 1.0);
+  scan.begin_step(counters, nullptr, nullptr, 1.0);
   auto& p = system->particles;
   scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) {
     return resolve_contact<2>(touch.key, touch.normal, system->box, system->particles);
@@ -173,7 +173,7 @@ TEST(ContactScan, SlidingKeepsEnergyAndMomentumOfUnequalMasses) {
     std::vector<Reaction<2>> reactions;
     ContactScan<2> scan(*system, 100, reactions);
     const std::vector<Vec<2>> a = {{2, 0}, {-2, 0}};
-    scan.begin_slab(counters, nullptr, &a, 1.0);
+    scan.begin_step(counters, nullptr, &a, 1.0);
     auto& p = system->particles;
     scan.resolve(0, p.x, p.v, [&](const Touch<2>& touch) {
       return resolve_contact<2>(touch.key, touch.normal, system->box, system->particles);

@@ -43,7 +43,7 @@ TEST(SlabWatch, RestoresTheStateOfTheFirstCut) {
     const int steps = s.steps;
     watch.begin();
     for (int piece = 0; piece < 3; ++piece) {
-      watch.cut();
+      watch.before_change();
       s.change();
       s.x.resize(2 + static_cast<std::size_t>(piece));  // particles migrate
       s.counts.resize(s.x.size());
@@ -66,7 +66,7 @@ TEST(SlabWatch, ASlabDoneAtOneStrokeKeepsItsEnd) {
   State s;
   SlabWatch watch(s.fields, 1, [] { return false; }, {});
   watch.begin();
-  watch.cut();
+  watch.before_change();
   s.change();
   watch.begin();
   s.change();
@@ -81,13 +81,13 @@ TEST(SlabWatch, IsLeftWhereTheRunIsToStop) {
   SlabWatch watch(
       s.fields, 1, [&] { return stop; }, [&] { return stop; });
   watch.begin();
-  EXPECT_NO_THROW(watch.cut());
+  EXPECT_NO_THROW(watch.before_change());
   EXPECT_NO_THROW(watch.look());
   EXPECT_FALSE(watch.asked_here());
   s.change();
   stop = true;
   EXPECT_THROW(watch.look(), SlabLeft);
-  EXPECT_THROW(watch.cut(), SlabLeft);
+  EXPECT_THROW(watch.before_change(), SlabLeft);
   EXPECT_TRUE(watch.asked_here());
   watch.restore();
   EXPECT_EQ(s.debt, 11);
