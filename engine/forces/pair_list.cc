@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "engine/base/error.h"
 #include "engine/search/cell_grid.h"
@@ -13,6 +14,10 @@ namespace {
 
 /// More pairs, in all and for each particle, result from a step that is far too long.
 constexpr std::size_t kMaxPairs = 100'000'000, kMaxPartners = 5000;
+/// Cells are as long as the reach, but along the last axis they are thinner, so that fewer particles of a row of cells
+/// are out of reach.
+constexpr int kSlices = 8;
+
 template <int D>
 double farther(double squared, const Vec<D>& way) {
   const double other = way.squaredNorm();
@@ -115,95 +120,6 @@ bool CutoffList<D>::follow(const PairStep<D>& step, std::size_t first, std::size
   return true;
 }
 
-namespace {
-
-/// Part of a row of cells along the last axis, displaced by `boxes` boxes.
-struct Piece {
-  std::int32_t begin, end, boxes;
-};
-
-/// The cells from `low` to `high`, which may cross the periodic boundary.
-std::vector<Piece> pieces(std::int32_t low, std::int32_t high, std::int32_t count, bool periodic) {
-  if (!periodic) return {{std::max(low, 0), std::min(high, count - 1) + 1, 0}};
-  std::vector<Piece> found;
-  const auto box = [&](std::int32_t c) { return c >= 0 ? c / count : -((count - 1 - c) / count); };
-  for (std::int32_t q = box(low); q <= box(high); ++q)
-    found.push_back({std::max(low - q * count, 0), std::min(high - q * count, count - 1) + 1, q});
-  return found;
-}
-
-/// The places of particles, sorted by cell, and the range of a search along each axis. Grid cells are divided into
-/// kSlices slices along the last axis, so that partners are consecutive along it.
-template <int D>
-struct Cells {
-  static constexpr std::int32_t kSlices = 8;
-  CellGrid<D> grid;
-  std::size_t count;  // of cells
-  std::array<std::int32_t, D> range;
-  std::vector<std::uint32_t> start;  // the first place of each cell: of own particles and then, if any, of ghosts
-  std::vector<std::vector<Piece>> around, ahead;  // for each cell of a row: the whole range, and its upper half
-
-  Cells(const CellGrid<D>& cells, double reach, bool ghosts)
-      : grid(cells), count(kSlices * cells.cells()), start((ghosts ? 2 : 1) * count + 1) {
-    for (int k = 0; k < D; ++k) {
-      const double edges = reach / grid.edge(k);
-      range[k] = static_cast<std::int32_t>(std::clamp(std::ceil(k < D - 1 ? edges : kSlices * edges), 1.0, 1e8));
-    }
-    const std::int32_t slices = kSlices * grid.count(D - 1), far = range[D - 1];
-    const bool periodic = grid.box().periodic(D - 1);
-    for (std::int32_t c = 0; c < slices; ++c) {
-      around.push_back(pieces(c - far, c + far, slices, periodic));
-      ahead.push_back(pieces(c, c + far, slices, periodic));
-    }
-  }
-
-  std::size_t index(const Vec<D>& x) const {
-    const Cell<D> cell = grid.cell(x);
-    const double part = (x[D - 1] - grid.face(D - 1, cell[D - 1])) * grid.inverse_edge(D - 1);
-    return kSlices * grid.index(cell) + static_cast<std::size_t>(std::clamp(kSlices * part, 0.0, kSlices - 1.0));
-  }
-
-  /// The ranges of places with partners for the particles of a cell, sorted by image. `half`: each pair of cells once,
-  /// and the first range begins with the cell itself; else all cells within reach.
-  void partners(const Cell<D>& centre, bool half, std::vector<PartnerRange>& found) const {
-    found.clear();
-    bool elsewhere = false;
-    const auto add = [&](std::size_t row, const Image<D>& boxes, const std::vector<Piece>& some) {
-      for (const Piece& piece : some) {
-        PartnerRange part{
-            start[row + static_cast<std::size_t>(piece.begin)], start[row + static_cast<std::size_t>(piece.end)], {}};
-        for (int k = 0; k < D - 1; ++k) part.image[k] = -boxes[k];
-        part.image[D - 1] = -piece.boxes;
-        elsewhere = elsewhere || !part.here();
-        if (part.begin < part.end) found.push_back(part);
-      }
-    };
-    const auto last = static_cast<std::size_t>(centre[D - 1]);
-    Cell<D> row = centre;
-    row[D - 1] = 0;
-    if (half) add(kSlices * grid.index(row), {}, ahead[last]);
-    const std::int32_t side = D == 3 ? range[1] : 0;
-    for (std::int32_t a = half ? 0 : -range[0]; a <= range[0]; ++a) {
-      typename CellGrid<D>::Step first, second{};
-      if (!grid.step(0, centre[0] + a, first)) continue;
-      for (std::int32_t b = half && a == 0 ? 1 : -side; b <= side; ++b) {
-        Image<D> boxes{};
-        boxes[0] = first.boxes;
-        if constexpr (D == 3) {
-          if (!grid.step(1, centre[1] + b, second)) continue;
-          boxes[1] = second.boxes;
-        }
-        add(kSlices * (first.offset + second.offset), boxes, around[last]);
-      }
-    }
-    if (elsewhere)
-      std::ranges::stable_sort(found.begin() + (half ? 1 : 0), found.end(), {},
-                               [](const PartnerRange& part) { return std::pair(!part.here(), part.image); });
-  }
-};
-
-}  // namespace
-
 template <int D>
 void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles) {
   made_ = true;
@@ -220,21 +136,23 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
   records_.own = members.size();
   members.insert(members.end(), ghosts.begin(), ghosts.end());
   const double reach = cutoff_ + skin_.width();
-  Cells<D> cells(CellGrid<D>(box_, reach, extent), reach, !ghosts.empty());
+  const CellGrid<D> grid(box_, reach, extent, 2, kSlices);
+  const Cell<D> range = grid.range(reach);
 
   // Counting sort by cell, own particles before ghosts.
-  std::vector<std::uint32_t> at(members.size());
+  std::vector<std::uint32_t> at(members.size()), start((ghosts.empty() ? 1 : 2) * grid.cells() + 1);
   for (std::size_t m = 0; m < members.size(); ++m) {
-    at[m] = static_cast<std::uint32_t>(cells.index(step.x[members[m]]) + (m < records_.own ? 0 : cells.count));
-    ++cells.start[at[m] + 1];
+    at[m] =
+        static_cast<std::uint32_t>(grid.index(grid.cell(step.x[members[m]])) + (m < records_.own ? 0 : grid.cells()));
+    ++start[at[m] + 1];
   }
-  const std::size_t fullest = *std::ranges::max_element(cells.start);
-  for (std::size_t c = 1; c < cells.start.size(); ++c) cells.start[c] += cells.start[c - 1];
-  std::vector<std::uint32_t> next(cells.start.begin(), cells.start.end() - 1);
+  const std::size_t fullest = *std::ranges::max_element(start);
+  std::partial_sum(start.begin(), start.end(), start.begin());
+  std::vector<std::uint32_t> next = start;
   records_.order.resize(members.size());
   for (std::size_t m = 0; m < members.size(); ++m) records_.order[next[at[m]]++] = members[m];
   double around = 1;
-  for (int k = 0; k < D; ++k) around *= 2 * cells.range[k] + 1;
+  for (int k = 0; k < D; ++k) around *= 2 * range[k] + 1;
   records_.most_partners = static_cast<std::size_t>((ghosts.empty() ? 1 : 2) * around * static_cast<double>(fullest));
 
   for (auto& coordinate : built_at_) coordinate.assign(members.size() + 8, 0);
@@ -246,7 +164,7 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
   std::vector<Image<D>> boxes(members.size());
   for (std::size_t r = 0; r < members.size(); ++r) {
     const Id i = records_.order[r];
-    boxes[r] = cells.grid.boxes(cells.grid.cell(step.x[i]));
+    boxes[r] = grid.boxes(grid.cell(step.x[i]));
     const Vec<D> home = step.x[i] - box_.shift(boxes[r]);
     std::uint64_t code = filter_.species.code(i);
     bool moving = boxes[r] != Image<D>{};
@@ -268,18 +186,21 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
   // particles in all cells around it, if this rank evaluates the pair.
   std::vector<PartnerRange> ranges;
   Cell<D> centre{};
-  for (std::size_t c = 0; c + 1 < cells.start.size(); ++c) {
-    if (cells.start[c] == cells.start[c + 1]) continue;
-    const bool own = c < cells.count;
-    std::size_t rest = c % cells.count;
-    for (int k = D - 1; k >= 0; --k) {
-      const std::size_t slices = k < D - 1 ? 1 : Cells<D>::kSlices;
-      const std::size_t count = slices * static_cast<std::size_t>(cells.grid.count(k));
-      centre[k] = static_cast<std::int32_t>(rest % count);
-      rest /= count;
-    }
-    cells.partners(centre, own, ranges);
-    for (std::uint32_t r = cells.start[c]; r < cells.start[c + 1] && !ranges.empty(); ++r) {
+  for (std::size_t c = 0; c + 1 < start.size(); ++c, grid.advance(centre)) {
+    if (start[c] == start[c + 1]) continue;
+    const bool own = c < grid.cells();
+    bool elsewhere = false;
+    ranges.clear();
+    grid.for_each_range(centre, range, own, [&](std::size_t first, std::size_t end, const Image<D>& away) {
+      if (start[first] == start[end]) return;
+      ranges.push_back({start[first], start[end], {}});
+      for (int k = 0; k < D; ++k) ranges.back().image[k] = -away[k];
+      elsewhere = elsewhere || !ranges.back().here();
+    });
+    if (elsewhere)  // equal images follow each other
+      std::ranges::stable_sort(ranges.begin() + (own ? 1 : 0), ranges.end(), {},
+                               [](const PartnerRange& part) { return std::pair(!part.here(), part.image); });
+    for (std::uint32_t r = start[c]; r < start[c + 1] && !ranges.empty(); ++r) {
       if (own) ranges[0].begin = r + 1;
       find_pairs(r, ranges);
       if (sizes_[own ? 0 : 1] +

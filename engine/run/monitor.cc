@@ -75,13 +75,12 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
   fields.add_value("sampled walls", sampled_walls_);
   fields.add_value("transient", transient_);
   fields.add_value("end of the transient", transient_end_);
-  fields.add_of_run({"last measurement", [this](Archive& archive) {
-                       archive(shot_.time, shot_.step, shot_.collisions, shot_.kinetic, shot_.potential, shot_.shadow,
-                               shot_.momentum, shot_.temperature, shot_.dissipated, shot_.work, shot_.heat);
-                     }});
+  static_assert(sizeof(Readings<D>) == (10 + D) * sizeof(double),
+                "a checkpoint holds these bytes: no padding, or a new format");
+  fields.add_value<Readings<D>>("last measurement", shot_);
   if (system.box.contacts.rough())
     fields.add_of_run({"last rotation", [this](Archive& archive) {
-                         archive(shot_.rotational, shot_.rotational_temperature);
+                         archive(static_cast<SpinReadings&>(shot_));
                          statistics_.rotational_energy = shot_.rotational;
                        }});
   fields.add_value("next frame", frames_.next());
@@ -296,7 +295,7 @@ void Monitor<D>::take(const Waiting& slab, const Sums& sums) {
   s.max_energy_error = std::max(s.max_energy_error, std::abs(account_.energy - account_.first_energy));
   if (s.max_shadow_energy_error)
     s.max_shadow_energy_error =
-        std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow + slab.drained - account_.first_shadow));
+        std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow + slab.tally.drained() - account_.first_shadow));
   guard(energy, magnitude);
   if (s.max_momentum_error)
     s.max_momentum_error =
@@ -307,7 +306,7 @@ void Monitor<D>::take(const Waiting& slab, const Sums& sums) {
   account_.path += path;
   add_to_series(slab, path);
   if (waits() && transient_end_) {
-    s.equilibrium = {*transient_end_, slab.shot.time};
+    s.equilibrium = {*transient_end_, slab.time};
     begin_means();
   }
 }
@@ -320,7 +319,7 @@ void Monitor<D>::note_overlap(const Waiting& slab, const Sums& sums) {
   Overlap worst = sums.overlaps.worst;
   const double size = std::max(system_.box.edges.maxCoeff(), sums.motion.farthest);
   if (!(worst.length > kRoundingOfPositions * (size + sums.motion.fastest * slab.elapsed))) return;
-  worst.time += slab.shot.time - slab.elapsed;
+  worst.time += slab.time - slab.elapsed;
   if (worst.depth > kDeepestOverlap)
     throw Error(Failure::numerical, overlap_text(worst, system_.box) + ", at step " + std::to_string(shot_.step) +
                                         ", time " + short_text(worst.time) + "; use a smaller integrator.step");
@@ -335,18 +334,11 @@ typename Monitor<D>::Waiting Monitor<D>::observed(double time, const Particles<D
   const Particles<D>* elsewhere = integrator ? integrator->energy_state() : nullptr;
   const Particles<D>& nodes = elsewhere ? *elsewhere : state;
   const PotentialSums* potential = integrator && fresh ? integrator->potential() : nullptr;
-  const ContactTally& tally = statistics_.counters;
-  Waiting now{.shot = {.time = time,
-                       .step = statistics_.steps,
-                       .collisions = tally.sphere_sphere,
-                       .particles = &state,
-                       .dissipated = tally.dissipated.value(),
-                       .work = tally.work.value(),
-                       .heat = tally.heat.value()},
-              .own = {own_motion(system_, state, nodes), potential ? *potential : own_energy<D>(system_, nodes.x), {}},
-              .tally = tally,
-              .drained = statistics_.counters.drained(),
-              .shadow_term = std::numeric_limits<double>::quiet_NaN()};
+  Waiting now{time,
+              statistics_.steps,
+              &state,
+              {own_motion(system_, state, nodes), potential ? *potential : own_energy<D>(system_, nodes.x), {}},
+              statistics_.counters};
   Counters uncounted;
   if (with_shadow) now.shadow_term = shadow_term<D>(system_, nodes, integrator->accelerations(), scratch_, uncounted);
   return now;
@@ -355,16 +347,17 @@ typename Monitor<D>::Waiting Monitor<D>::observed(double time, const Particles<D
 /// Measures a state; `sums` are those of all ranks.
 template <int D>
 Snapshot<D> Monitor<D>::measured(const Waiting& at, const Sums& sums) {
-  const Measurement<D> found = carom::measured(system_, sums.motion, sums.potential, tail_);
-  Snapshot<D> shot = at.shot;
-  shot.kinetic = found.shot.kinetic;
-  shot.rotational = found.shot.rotational;
-  shot.potential = found.shot.potential;
-  shot.momentum = found.shot.momentum;
-  shot.temperature = found.shot.temperature;
-  shot.rotational_temperature = found.shot.rotational_temperature;
+  Measurement<D> found = carom::measured(system_, sums.motion, sums.potential, tail_);
+  Snapshot<D>& shot = found.shot;
+  shot.time = at.time;
+  shot.step = at.step;
+  shot.particles = at.particles;
+  shot.collisions = at.tally.sphere_sphere;
+  shot.dissipated = at.tally.dissipated.value();
+  shot.work = at.tally.work.value();
+  shot.heat = at.tally.heat.value();
   // The conserved quantity: the energy of the spheres, what they have lost, and less what walls and baths gave them.
-  account_.energy = shot.kinetic + sums.potential.energy.value() + at.drained;
+  account_.energy = shot.kinetic + sums.potential.energy.value() + (shot.dissipated - shot.work - shot.heat);
   account_.magnitude = found.magnitude;
   account_.virial = found.virial;
   account_.speed = found.speed;

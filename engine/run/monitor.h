@@ -98,10 +98,12 @@ class Monitor {
   };
   /// A state whose sums over all ranks have not been made.
   struct Waiting {
-    Snapshot<D> shot;  // without what follows from the sums
+    double time;
+    std::int64_t step;
+    const Particles<D>* particles;
     Sums own;
     ContactTally tally;
-    double drained, shadow_term, elapsed = 0;
+    double shadow_term = std::numeric_limits<double>::quiet_NaN(), elapsed = 0;
   };
 
   void sample(double time, const Particles<D>& state);

@@ -20,59 +20,12 @@ namespace {
 /// Cells of half the range are the fastest, measured from 1/1 to 1/4 for ranges of three and four diameters.
 constexpr int kCellsInRange = 2;
 
-/// A contiguous range of particles in neighbouring cells of a row, and the shift of x_i − x_j for the row's image.
+/// A contiguous range of particles in the order of the cells, and the displacement of their image.
 template <int D>
 struct Run {
   std::uint32_t begin, end;
   Vec<D> shift;
 };
-
-/// Lists the ranges of all cells after `centre` in the order of unwrapped cells that may hold partners, so that each
-/// pair of cells is visited once. The caller handles pairs within the cell.
-template <int D>
-void list_runs(const CellGrid<D>& grid, const std::vector<std::uint32_t>& start, const Cell<D>& centre,
-               const Cell<D>& reach, double range, std::vector<Run<D>>& runs) {
-  runs.clear();
-  constexpr int last = D - 1;
-  const auto row = [&](const Cell<D>& offset, std::int32_t from) {
-    Vec<D> shift = Vec<D>::Zero();
-    std::size_t first = 0;  // first cell of the row
-    double squared_gap = 0;
-    typename CellGrid<D>::Step to;
-    for (int k = 0; k < last; ++k) {
-      if (!grid.step(k, centre[k] + offset[k], to)) return;
-      shift[k] = -to.boxes * grid.box().edges[k];
-      first += to.offset;
-      const double gap = std::max(std::abs(offset[k]) - 1, 0) * grid.edge(k);
-      squared_gap += gap * gap;
-    }
-    if (squared_gap > range * range) return;
-    const std::int32_t n = grid.count(last);
-    const auto along =
-        std::min(reach[last],
-                 static_cast<std::int32_t>(std::ceil(std::sqrt(range * range - squared_gap) / grid.edge(last) + 1e-9)));
-    std::int32_t low = centre[last] + std::max(from, -along), high = centre[last] + along;
-    if (!grid.box().periodic(last)) low = std::max(low, 0), high = std::min(high, n - 1);
-    while (low <= high && grid.step(last, low, to)) {
-      const std::int32_t stop = std::min(high, (to.boxes + 1) * n - 1);
-      shift[last] = -to.boxes * grid.box().edges[last];
-      const std::size_t begin = first + to.offset;
-      const std::uint32_t a = start[begin], b = start[begin + static_cast<std::size_t>(stop - low) + 1];
-      if (a < b) runs.push_back({a, b, shift});
-      low = stop + 1;
-    }
-  };
-  Cell<D> offset{};
-  row(offset, 1);
-  if constexpr (D == 3)
-    for (offset[0] = 0, offset[1] = 1; offset[1] <= reach[1]; ++offset[1]) row(offset, -reach[last]);
-  for (offset[0] = 1; offset[0] <= reach[0]; ++offset[0]) {
-    if constexpr (D == 2)
-      row(offset, -reach[last]);
-    else
-      for (offset[1] = -reach[1]; offset[1] <= reach[1]; ++offset[1]) row(offset, -reach[last]);
-  }
-}
 
 /// The volume in which an ideal gas has a partner at distances from a to b, averaged over a region with these edges;
 /// there are no partners beyond walled edges.
@@ -175,12 +128,9 @@ void RadialDistribution<D>::add_sample(double /*time*/, const Particles<D>& part
   if (this->samples() == 0) count(particles);
   const std::size_t n = particles.size(), bins = static_cast<std::size_t>(options_.bins);
   const CellGrid<D> grid(system_.box, options_.range / kCellsInRange, {n, Vec<D>::Zero(), Vec<D>::Zero()}, 1);
-  Cell<D> reach;        // how many cells away a partner may be
+  const Cell<D> reach = grid.range(options_.range);
   double farthest = 0;  // squared distance of two particles in such cells
-  for (int k = 0; k < D; ++k) {
-    reach[k] = static_cast<std::int32_t>(std::ceil(options_.range / grid.edge(k)));
-    farthest += (reach[k] + 1) * grid.edge(k) * (reach[k] + 1) * grid.edge(k);
-  }
+  for (int k = 0; k < D; ++k) farthest += (reach[k] + 1) * grid.edge(k) * (reach[k] + 1) * grid.edge(k);
 
   // Sort the particles in the order of the cells, so that a row of cells is a contiguous range.
   start_.assign(grid.cells() + 1, 0);
@@ -215,18 +165,20 @@ void RadialDistribution<D>::add_sample(double /*time*/, const Particles<D>& part
   Eigen::ArrayXd squared;
   Eigen::ArrayXi shell;
   Cell<D> centre{};
-  for (std::size_t cell = 0; cell < grid.cells(); ++cell) {
+  for (std::size_t cell = 0; cell < grid.cells(); ++cell, grid.advance(centre)) {
     const std::uint32_t begin = start_[cell], own = start_[cell + 1] - begin;
     if (own > 0) {
-      list_runs<D>(grid, start_, centre, reach, options_.range, runs);
-      runs.insert(runs.begin(), {begin, begin + own, Vec<D>::Zero()});
+      runs.clear();
+      grid.for_each_range(centre, reach, true, [&](std::size_t first, std::size_t end, const Image<D>& boxes) {
+        if (start_[first] < start_[end]) runs.push_back({start_[first], start_[end], system_.box.shift(boxes)});
+      });
       Eigen::Index size = 0;
       for (const Run<D>& run : runs) size += run.end - run.begin;
       for (int k = 0; k < D; ++k) {
         if (partner[k].size() < size) partner[k].resize(2 * size);
         double* to = partner[k].data();
         for (const Run<D>& run : runs)
-          for (std::uint32_t j = run.begin; j < run.end; ++j) *to++ = x_[k][j] - run.shift[k];
+          for (std::uint32_t j = run.begin; j < run.end; ++j) *to++ = x_[k][j] + run.shift[k];
       }
       kind.clear();
       if (kinds > 1)
@@ -247,7 +199,6 @@ void RadialDistribution<D>::add_sample(double /*time*/, const Particles<D>& part
           for (Eigen::Index j = 0; j < rest; ++j) ++of[kind[static_cast<std::size_t>(j) + i + 1]][shell[j]];
       }
     }
-    for (int k = D - 1; k >= 0 && ++centre[k] == grid.count(k); --k) centre[k] = 0;
   }
   std::vector<double> of_sample(series_.columns());
   for (std::size_t k = 0; k < counts_.size(); ++k) {

@@ -68,27 +68,36 @@ struct WallLoad {
   double load() const { return area > 0 ? force / area : force; }
 };
 
-/// What an observer gets: a state and its observables, all at `time`.
+/// The numbers of a Snapshot that are state of a run: checkpoints store the bytes of this struct, which has no padding.
 template <int D>
-struct Snapshot {
+struct Readings {
   double time = 0;
-  std::int64_t step = 0;                    ///< slabs completed (free flight: epochs begun or completed)
-  std::uint64_t collisions = 0;             ///< pair collisions so far
-  const Particles<D>* particles = nullptr;  ///< all particles; with several ranks this rank's block (with ids)
-  double kinetic = 0, potential = 0;        ///< [energy]; K with that of spins, V with its long-range corrections
-  double rotational = 0;                    ///< the part of K that is in spins, ½ Σ I ω² [energy]
+  std::int64_t step = 0;              ///< slabs completed (free flight: epochs begun or completed)
+  std::uint64_t collisions = 0;       ///< pair collisions so far
+  double kinetic = 0, potential = 0;  ///< [energy]; K with that of spins, V with its long-range corrections
   double shadow = std::numeric_limits<double>::quiet_NaN();  ///< S_h [energy]; NaN if the method has none
-  double max_energy_error = 0;                               ///< as in Statistics, so far [energy]
   Vec<D> momentum = Vec<D>::Zero();
   double temperature = 0;  ///< Σ m v²/(D N) of the N particles that are not fixed, in units of energy (k_B = 1); total
                            ///< momentum is not subtracted
-  double rotational_temperature = 0;  ///< Σ I ω²/(f N), f = 1 in two dimensions, 3 in three [energy]
-  double pressure = 0;  ///< virial: (Σ m v² + Σ d·F + Σ d·impulse/Δt)/(D V), collisions since the last thermo row
   double dissipated = 0, work = 0, heat = 0;  ///< sums of ContactTally so far [energy]
-  std::vector<WallLoad> walls{};              ///< in thermo rows: of all walls, in the order of Box::walls()
-  double total() const { return kinetic + potential; }
+};
+
+/// The numbers of a Snapshot that runs with rough contacts store in addition.
+struct SpinReadings {
+  double rotational = 0;              ///< the part of K that is in spins, ½ Σ I ω² [energy]
+  double rotational_temperature = 0;  ///< Σ I ω²/(f N), f = 1 in two dimensions, 3 in three [energy]
+};
+
+/// What an observer gets: a state and its observables, all at `time`.
+template <int D>
+struct Snapshot : Readings<D>, SpinReadings {
+  const Particles<D>* particles = nullptr;  ///< all particles; with several ranks this rank's block (with ids)
+  double max_energy_error = 0;              ///< as in Statistics, so far [energy]
+  double pressure = 0;  ///< virial: (Σ m v² + Σ d·F + Σ d·impulse/Δt)/(D V), collisions since the last thermo row
+  std::vector<WallLoad> walls{};  ///< in thermo rows: of all walls, in the order of Box::walls()
+  double total() const { return this->kinetic + this->potential; }
   /// What stays constant, whatever contacts, walls and baths do.
-  double conserved() const { return total() + dissipated - work - heat; }
+  double conserved() const { return total() + this->dissipated - this->work - this->heat; }
 };
 
 /// The times at which an observer needs the particles: start, start + interval, …

@@ -48,13 +48,23 @@ class SizedCells {
   /// shift(image) may touch a particle with this reach at x.
   template <class Visit>
   void for_each_near(const Vec<D>& x, double reach, Visit&& visit) const {
-    for (const Level& level : levels_) look_into(level, x, reach + level.largest + skin_, visit);
+    for (const Level& level : levels_) {
+      const Cell<D> range = level.grid.range(reach + level.largest + skin_);
+      const auto look = [&](std::size_t first, std::size_t end, const Image<D>& away) {
+        for (std::size_t cell = first; cell < end; ++cell)
+          for (std::uint32_t j = level.first[cell]; j != kNoParticle; j = places_[j].next) {
+            Image<D> image = places_[j].boxes;
+            for (int k = 0; k < D; ++k) image[k] -= away[k];
+            visit(j, image);
+          }
+      };
+      level.grid.for_each_range(level.grid.cell(x), range, false, look);
+    }
   }
 
  private:
   static constexpr std::size_t kOctaves = 8;  // the last one holds all smaller particles
   static constexpr std::uint32_t kNoParticle = std::numeric_limits<std::uint32_t>::max();
-  static constexpr double kLargestNumber = 1 << 28;  // the largest number of cells in a range
 
   struct Level {
     Level(double reach, const CellGrid<D>& cells) : largest(reach), grid(cells), first(cells.cells(), kNoParticle) {}
@@ -70,45 +80,6 @@ class SizedCells {
   std::size_t octave(double reach) const {
     if (reach > 0.5 * largest_) return 0;
     return reach > 0 ? std::min(static_cast<std::size_t>(std::ilogb(largest_ / reach)), kOctaves - 1) : kOctaves - 1;
-  }
-
-  template <class Visit>
-  void look_into(const Level& level, const Vec<D>& x, double reach, Visit&& visit) const {
-    const CellGrid<D>& grid = level.grid;
-    const Cell<D> centre = grid.cell(x);
-    Cell<D> range, row;
-    bool inside = true;
-    for (int k = 0; k < D; ++k) {
-      range[k] =
-          std::max(1, static_cast<std::int32_t>(std::min(std::ceil(reach / grid.edge(k) - 1e-14), kLargestNumber)));
-      row[k] = centre[k] - range[k];
-      inside = inside && row[k] >= 0 && centre[k] < grid.count(k) - range[k];
-    }
-    if (inside) {  // no images, and the cells of a row are contiguous
-      const auto length = 2 * static_cast<std::size_t>(range[D - 1]) + 1;
-      do {
-        const std::uint32_t* const first = level.first.data() + grid.index(row);
-        for (const std::uint32_t* cell = first; cell < first + length; ++cell)
-          for (std::uint32_t j = *cell; j != kNoParticle; j = places_[j].next) visit(j, places_[j].boxes);
-      } while (next_row(row, centre, range));
-      return;
-    }
-    grid.for_each_around(centre, range, [&](std::size_t cell, const Image<D>& away) {
-      for (std::uint32_t j = level.first[cell]; j != kNoParticle; j = places_[j].next) {
-        Image<D> image = places_[j].boxes;
-        for (int k = 0; k < D; ++k) image[k] -= away[k];
-        visit(j, image);
-      }
-    });
-  }
-
-  /// Moves to the next row within `range` of the centre; returns false after the last row.
-  static bool next_row(Cell<D>& row, const Cell<D>& centre, const Cell<D>& range) {
-    for (int k = D - 2; k >= 0; --k) {
-      if (++row[k] <= centre[k] + range[k]) return true;
-      row[k] = centre[k] - range[k];
-    }
-    return false;
   }
 
   double skin_, largest_;

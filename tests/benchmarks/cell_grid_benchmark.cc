@@ -29,7 +29,7 @@ void cell_of(benchmark::State& state) {
 BENCHMARK(cell_of<2>)->Arg(64);
 BENCHMARK(cell_of<3>)->Arg(13);
 
-/// The 3^D cells around each sphere, empty visits.
+/// The 3^D cells around each sphere, in ranges; empty visits.
 template <int D>
 void cells_around(benchmark::State& state) {
   const auto system = lattice<D>(state);
@@ -39,8 +39,8 @@ void cells_around(benchmark::State& state) {
   range.fill(1);
   for (auto _ : state)
     for (const auto& place : x)
-      grid.for_each_around(grid.cell(place), range, [](std::size_t cell, const Image<D>& away) {
-        benchmark::DoNotOptimize(cell);
+      grid.for_each_range(grid.cell(place), range, false, [](std::size_t first, std::size_t, const Image<D>& away) {
+        benchmark::DoNotOptimize(first);
         benchmark::DoNotOptimize(away);
       });
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(x.size()));

@@ -397,6 +397,16 @@ TEST(Continue, AStateOfAnotherNumberOfParticlesIsRefused) {
     }
 }
 
+/// A run that is continued and stopped at once shows the measurements of the state in which it had been stopped.
+TEST(Continue, StopsAtOnce) {
+  for (const Scene<2>& scene : {springs("psa"), rough(springs("edda"))}) {
+    const Outcome<2> begun = run<2>(scene, 0, scene.plan, {.at = 5});  // no row and no frame is due then
+    const Outcome<2> again = run<2>(scene, 0, scene.plan, {.at = 0}, &begun.state);
+    ASSERT_GT(again.values.size(), 0u);
+    expect_tail(begun.values, again.values);
+  }
+}
+
 /// A simulation runs again to a later end.
 TEST(Continue, RunAgain) {
   for (const Scene<3>& scene : {yukawa("psa"), yukawa("edda"), fluid(), fluid(40)}) {

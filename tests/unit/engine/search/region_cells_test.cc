@@ -141,5 +141,37 @@ TEST(CellGrid, StoresFewerRowsOrAllOfThemInOrder) {
   }
 }
 
+/// The cells within a range, each as often as it has images there, and of two cells each only once if halved.
+TEST(CellGrid, RangesCoverAllCellsAroundOnce) {
+  Box<3> box;
+  box.edges = {4, 3, 2};
+  box.boundary = {Boundary::wall, Boundary::periodic, Boundary::periodic};
+  const CellGrid<3> grid(box, 0.99, {1000, Vec<3>::Zero(), box.edges}, 2, 3);
+  ASSERT_EQ((Cell<3>{grid.count(0), grid.count(1), grid.count(2)}), (Cell<3>{4, 3, 6}));
+  const Cell<3> range = grid.range(1.6);
+  EXPECT_EQ(range, (Cell<3>{2, 2, 5}));
+  Cell<3> centre{};
+  for (std::size_t at = 0; at < grid.cells(); ++at, grid.advance(centre)) {
+    ASSERT_EQ(grid.index(centre), at);
+    std::multiset<std::pair<std::size_t, Image<3>>> all, half, found, found_half;
+    for (std::int32_t a = std::max(0, centre[0] - 2); a <= std::min(3, centre[0] + 2); ++a)
+      for (std::int32_t b = centre[1] - 2; b <= centre[1] + 2; ++b)
+        for (std::int32_t c = centre[2] - 5; c <= centre[2] + 5; ++c) {
+          const Cell<3> cell{a, b, c};
+          all.insert({grid.index(cell), grid.boxes(cell)});
+          if (cell >= centre) half.insert({grid.index(cell), grid.boxes(cell)});
+        }
+    for (const bool halved : {false, true})
+      grid.for_each_range(centre, range, halved, [&](std::size_t first, std::size_t end, const Image<3>& boxes) {
+        auto& to = halved ? found_half : found;
+        EXPECT_TRUE(!halved || !to.empty() || first == at);
+        for (; first < end; ++first) to.insert({first, boxes});
+      });
+    EXPECT_EQ(found, all);
+    EXPECT_EQ(found_half, half);
+  }
+  EXPECT_EQ(centre, Cell<3>{});
+}
+
 }  // namespace
 }  // namespace carom::region_cells_test
