@@ -121,10 +121,7 @@ void bind(py::module_& module, const char* name) {
   for (const Column<D>& column : columns<D>())
     if (column.python)
       session_type.def_property_readonly(column.python, [&column](S& s) { return value_of(column, s.shot()); });
-  session_type
-      .def(py::init([](const std::vector<double>& edges, const std::vector<std::string>& boundary, bool known) {
-        return std::make_unique<S>(edges, boundary, known);
-      }))
+  session_type.def(py::init<const std::vector<double>&, const std::vector<std::string>&>())
       .def("add_particles",
            [](S& session, const Array& x, const Array& v, const Array& radius, const Array& mass, const Array& charge,
               const Array& spin, const std::string& species, double inertia) {
@@ -231,11 +228,7 @@ void bind(py::module_& module, const char* name) {
              for (const std::string& table : without) values.list(table).clear();
              return write_deck(values);
            })
-      .def_property_readonly("wall_loads", &S::wall_loads)
-      .def_property_readonly("box", [](const S& s) {
-        const Vec<D>& edges = s.box().edges;
-        return std::vector<double>(edges.begin(), edges.end());
-      });
+      .def_property_readonly("wall_loads", &S::wall_loads);
 }
 
 /// A session, its warnings, and the keys of [output] that the deck gives, with its directory.

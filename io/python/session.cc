@@ -54,21 +54,9 @@ void set_bonds(Parameters& table, const Interaction<D>& term) {
 
 }  // namespace
 
-/// Forwards the run's snapshots to the session.
 template <int D>
-class Session<D>::Shown : public Observer<D> {
- public:
-  Shown(Session& session, const RunHooks& hooks) : session_(session), hooks_(hooks) {}
-  void thermo(const Snapshot<D>& shot) override { session_.show(shot, hooks_); }
-
- private:
-  Session& session_;
-  const RunHooks& hooks_;
-};
-
-template <int D>
-Session<D>::Session(std::span<const double> edges, const std::vector<std::string>& boundary, bool known) {
-  for (int k = 0; k < D; ++k) box_.edges[k] = edges[k];
+Session<D>::Session(const std::vector<double>& edges, const std::vector<std::string>& boundary) {
+  std::ranges::copy(edges, box_.edges.begin());
   for (int k = 0; k < D; ++k) box_.boundary[k] = find_boundary(boundary[k]).boundary;
   system_->species.clear();
   system_->box = box_;
@@ -76,7 +64,7 @@ Session<D>::Session(std::span<const double> edges, const std::vector<std::string
   for (const TableSchema& table : deck_schema()) values_.tables[table.name];
   set("", {{"format", std::int64_t{1}}});
   set("system", {{"dimension", std::int64_t{D}}, {"boundary", boundary}});
-  if (known) values_.find("system")->values.set("box", std::vector(edges.begin(), edges.end()));
+  if (!edges.empty()) values_.find("system")->values.set("box", edges);
   views_.rest(system_->particles);
 }
 
@@ -442,8 +430,7 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
     made.emplace(std::move(system_), *method, std::move(parameters), plan);
   }
   Simulation<D>& run = *made;
-  Shown shown(*this, hooks);
-  std::optional<RunRecord<D>> record;
+  hooks_ = &hooks;
   at_work_ = &run.system();
   live_ = &run.statistics();
   views_.lend(at_work_->particles);
@@ -459,9 +446,9 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
     const bool stop = hooks.stop && hooks.stop(run.statistics());
     // After a velocity change at the very end, the state before the last, shortened step is useless.
     if (stop || run.is_last_on_the_way() || (pushed && run.statistics().fraction_done >= 1))
-      save(run, state, record ? &*record : nullptr);
-    else if (record && deck_->output.checkpoint_wall && since(last_checkpoint) >= *deck_->output.checkpoint_wall) {
-      record->checkpoint();
+      save(run, state);
+    else if (record_ && deck_->output.checkpoint_wall && since(last_checkpoint) >= *deck_->output.checkpoint_wall) {
+      record_->checkpoint();
       last_checkpoint = Clock::now();
     }
     return stop;
@@ -472,48 +459,39 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
       state_.clear();
       checkpoint_.reset();
     };
+  bool started = false;
   const auto end = [&] {
-    statistics_ = *std::exchange(live_, nullptr);
-    if (shot_ && std::abs(shot_->time - statistics_.end_time) <= 1e-9 * step_) shot_->time = statistics_.end_time;
-    shown_until_ = std::max(shown_until_, statistics_.end_time);
-    averages_ = averages();
-    record_ = nullptr;
+    warnings_ = deck_warnings_;
+    if (record_)
+      warnings_.insert(warnings_.end(), record_->warnings().begin(), record_->warnings().end());
+    else if (const auto overlap = overlap_warning(*live_, box_))
+      warnings_.push_back(*overlap);
+    if (started) {
+      statistics_ = *live_;
+      if (shot_ && std::abs(shot_->time - statistics_.end_time) <= 1e-9 * step_) shot_->time = statistics_.end_time;
+      shown_until_ = std::max(shown_until_, statistics_.end_time);
+      averages_ = averages();
+    }
+    live_ = nullptr;
+    record_.reset();
     pushed_.clear();
     rest(at_work_->particles);
   };
-  bool started = false;
   try {
-    if (deck_) record_ = &record.emplace(*deck_, run, begun ? &head_ : nullptr);
-    run.add(shown);
+    if (deck_) record_.emplace(*deck_, run, begun ? &head_ : nullptr);
+    run.add(*this);
     started = true;
     run.run(inner);
-    if (record) record->close();
+    if (record_) record_->close();
   } catch (const std::exception& e) {
-    if (record) record->fail(e.what());
-    warn(record ? &*record : nullptr);
-    if (!started) {
-      record_ = nullptr, live_ = nullptr;
-      rest(at_work_->particles);
-      throw;
-    }
-    failure_ = e.what();
+    if (record_) record_->fail(e.what());
+    if (started) failure_ = e.what();
     end();
     throw;
   }
   end();
-  warn(record ? &*record : nullptr);
   state_ = std::move(state);
   interval_ = interval;
-}
-
-/// Keeps the warnings of a run with or without files.
-template <int D>
-void Session<D>::warn(const RunRecord<D>* record) {
-  warnings_ = deck_warnings_;
-  if (record)
-    warnings_.insert(warnings_.end(), record->warnings().begin(), record->warnings().end());
-  else if (const auto overlap = overlap_warning(live_ ? *live_ : statistics_, box_))
-    warnings_.push_back(*overlap);
 }
 
 /// The system between runs.
@@ -531,13 +509,13 @@ void Session<D>::rest(Particles<D>& particles) {
 }
 
 template <int D>
-void Session<D>::show(const Snapshot<D>& shot, const RunHooks& hooks) {
+void Session<D>::thermo(const Snapshot<D>& shot) {
   shot_ = shot;
   shot_->particles = nullptr;
   at_step_end_ = shot.particles == &at_work_->particles;
   views_.show(*shot.particles);
   showing_ = true;
-  if (hooks.show && shot.time > shown_until_) hooks.show();
+  if (hooks_->show && shot.time > shown_until_) hooks_->show();
   showing_ = false;
   views_.hide();
 }

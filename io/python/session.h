@@ -42,11 +42,11 @@ struct RunHooks {
 using Averages = std::map<std::string, std::vector<TableColumn>>;
 
 template <int D>
-class Session {
+class Session : Observer<D> {
  public:
   /// All members throw Error.
-  /// `known`: whether these are the edges, not those that take() brings.
-  Session(std::span<const double> edges, const std::vector<std::string>& boundary, bool known);
+  /// Without particles. No edges: take() will bring them.
+  Session(const std::vector<double>& edges, const std::vector<std::string>& boundary);
   /// The initial state of a deck, or a given state.
   explicit Session(Deck& deck, const std::optional<GivenState>& given = {}, const Pause& pause = {});
   /// The last checkpoint of a run that wrote files to a directory; the next run() continues the run and its files.
@@ -89,7 +89,6 @@ class Session {
   ParticleViews<D>& views() { return views_; }
   /// By species; 0 or missing: homogeneous.
   const std::vector<double>& inertias() const { return box_.contacts.inertias; }
-  const Box<D>& box() const { return box_; }
   const std::vector<std::string>& species() const { return species_; }
   std::size_t size() const { return size_; }
   /// Null if there is none yet.
@@ -112,7 +111,6 @@ class Session {
   const Plan& plan() const { return plan_; }
 
  private:
-  class Shown;
   void change(const char* what);
   void need_state_at_end(const char* what) const;
   double present() const { return showing_ ? shot_->time : statistics().end_time; }
@@ -126,12 +124,11 @@ class Session {
   bool reached(const Plan& plan) const;
   Bytes saved(const std::string& name, double interval) const;
   void rest(Particles<D>& particles);
-  void warn(const RunRecord<D>* record);
   void warn_of_start();
-  void show(const Snapshot<D>& shot, const RunHooks& hooks);
+  void thermo(const Snapshot<D>& shot) override;
   void describe(Plan& plan, bool begun, const RunHooks& hooks);
   void push(const Simulation<D>& run);
-  void save(Simulation<D>& run, std::map<std::string, Bytes>& state, RunRecord<D>* record);
+  void save(Simulation<D>& run, std::map<std::string, Bytes>& state);
 
   Box<D> box_;
   DeckValues values_;  // without particles, [placement], [run] and [output]; bonds that were found are pairs
@@ -154,16 +151,17 @@ class Session {
   double state_time_ = 0, interval_ = 0, step_ = 0;
   double shown_until_ = -1;
 
-  bool showing_ = false;        // RunHooks::show is running
-  bool at_step_end_ = false;    // RunHooks::show is called between two steps
-  std::vector<Vec<D>> pushed_;  // new velocities, set by a callback
+  const RunHooks* hooks_ = nullptr;  // of the active run
+  bool showing_ = false;             // RunHooks::show is running
+  bool at_step_end_ = false;         // RunHooks::show is called between two steps
+  std::vector<Vec<D>> pushed_;       // new velocities, set by a callback
 
   std::optional<std::vector<std::string>> output_;  // overrides of [output]; nullopt: no files
   std::string text_;                                // the deck that the particles are of; empty: of none
   std::optional<Deck> deck_;                        // deck of the run that writes files
   CheckpointHead head_;                             // positions in its files at the state to continue from
   std::shared_ptr<Checkpoint> checkpoint_;          // holds that state until the first run
-  const RunRecord<D>* record_ = nullptr;            // record of the active run
+  std::optional<RunRecord<D>> record_;              // of the active run
   Averages averages_;
   std::vector<std::string> deck_warnings_, warnings_;  // of the start of a run; of a run
   bool warned_ = false;  // of this system; changes of velocities and spins are no reason to look again

@@ -183,10 +183,8 @@ void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
                       "; the callback is called with each row: leave 'every' out, or give output() that thermo_interval"
                 : ", but output() got no thermo_interval, so that thermo.csv has its first and its last row only; the "
                   "callback is called with each row: give output() that thermo_interval"));
-  plan.frame_interval = of.frame_interval;
-  plan.thermo_interval = of.thermo_interval;
-  plan.events = of.events;
-  plan.from_equilibrium = of.from_equilibrium;
+  plan = of;
+  plan.step = 0;  // that of the integrator
 }
 
 /// Finds the warnings that a deck of this simulation would get before its run, on a copy of the system. There are none
@@ -233,18 +231,17 @@ void Session<D>::push(const Simulation<D>& run) {
 
 /// Saves the state to continue from, in memory and with the files.
 template <int D>
-void Session<D>::save(Simulation<D>& run, std::map<std::string, Bytes>& state, RunRecord<D>* record) {
+void Session<D>::save(Simulation<D>& run, std::map<std::string, Bytes>& state) {
   state.clear();
   save_state(*at_work_, into(state));
   state_time_ = run.statistics().end_time;
   state_steps_ = run.statistics().steps;
-  if (record) head_ = record->checkpoint();
+  if (record_) head_ = record_->checkpoint();
 }
 
 template <int D>
 Averages Session<D>::averages() const {
-  if (running_ && record_ == nullptr) return {};
-  if (record_ == nullptr) return averages_;
+  if (!record_) return running_ ? Averages() : averages_;
   Averages all;
   record_->files().for_each_average(
       [&](const std::string& name, const Observable<D>& average) { all[name] = average.table(); });

@@ -66,7 +66,7 @@ class Simulation:
         if not all(isinstance(rule, str) for rule in rules) or len(rules) not in (1, len(edges)):
             raise UsageError(f"Simulation: 'boundary' is {boundary!r}; give one name, or one for each of {len(edges)} axes")
         kind = _carom.Session2 if len(edges) == 2 else _carom.Session3
-        self._start(kind(list(edges), rules * (len(edges) // len(rules)), box is not None))
+        self._start(kind([] if box is None else list(edges), rules * (len(edges) // len(rules))))
 
     def _start(self, session):
         refuse_ranks()
@@ -152,7 +152,7 @@ class Simulation:
         for name, value in (("temperature", temperature), ("rotational_temperature", rotational_temperature)):
             if value is not None:
                 raise UsageError(f"add_particles: '{name}' goes with 'count'; call thermalize() after particles with positions")
-        if "box" not in self._session.tables("system")[0]:
+        if "box" not in self._table("system"):
             raise UsageError("add_particles: explicit positions need the 'box' of the simulation; give its edges")
         dimension = len(self.box)
         x = numbers("add_particles", "position", position)
@@ -484,7 +484,7 @@ class Simulation:
     charge = property(lambda self: self._session.constant("charge"), doc="Charges, (N,) [charge]; a view.")
     species = property(lambda self: self._session.constant("species"), doc="Indices into species_names, (N,); a view.")
     species_names = property(lambda self: self._session.species, doc="The names of the species.")
-    box = property(lambda self: self._session.box, doc="Edges of the box [length].")
+    box = property(lambda self: self._table("system").get("box", [1.0] * self._table("system")["dimension"]), doc="Edges of the box [length].")
     contacts = property(lambda self: self._session.tables("contact"), doc="The laws of contacts, as dictionaries of their options.")
     bath = property(lambda self: next(iter(self._session.tables("bath")), None),
                     doc="The heat bath, as a dictionary of its options; None: there is none.")
@@ -495,16 +495,19 @@ class Simulation:
     wall_loads = property(lambda self: self._session.wall_loads,
                           doc="By wall: the pressure on a face of the box [energy/length^D], the force on a further wall, since "
                               "the last row or callback; between runs those of the last one.")
-    boundary = property(lambda self: self._session.tables("system")[0]["boundary"], doc="The name of the boundary on each axis.")
+    boundary = property(lambda self: self._table("system")["boundary"], doc="The name of the boundary on each axis.")
 
-    title, description = (property(lambda self, key=key: self._session.tables("")[0][key],
-                                   lambda self, text, key=key: self._session.set("", self._session.tables("")[0] | {key: text}),
+    title, description = (property(lambda self, key=key: self._table("")[key],
+                                   lambda self, text, key=key: self._session.set("", self._table("") | {key: text}),
                                    doc=f"The {key} in decks and files.") for key in ("title", "description"))
 
     energy_error = property(lambda self: self._session.energy_error,
                             doc="The largest change of H + dissipated - work - heat since the first step, over max(|H_1|, K_1 + sum |V|).")
     force_passes = property(lambda self: self._session.force_passes, doc="Number of force passes: evaluations of pairs / interacting pairs.")
     wall_seconds = property(lambda self: self._session.wall_seconds, doc="Duration of the run [s].")
+
+    def _table(self, name):
+        return self._session.tables(name)[0]
 
     def __len__(self):
         return self._session.size
@@ -515,7 +518,7 @@ class Simulation:
 
     def __repr__(self):
         session = self._session
-        return (f"<carom.Simulation: {session.size} particles in {len(session.box)} dimensions, forces: "
+        return (f"<carom.Simulation: {session.size} particles in {len(self.box)} dimensions, forces: "
                 f"{', '.join(name for name, _ in session.forces) or 'none'}, integrator: {session.method or 'none'}>")
 
     def _repr_html_(self):
