@@ -116,7 +116,6 @@ void bind(py::module_& module, const char* name) {
       return view<typename decltype(all)::value_type::value_type>(all.data(), all.size(), columns, self);
     };
   };
-  const auto number = [](double (*get)(S&)) { return [get](S& session) { return get(session); }; };
   py::class_<S> session_type(module, name);
   for (const Column<D>& column : columns<D>())
     if (column.python)
@@ -125,14 +124,8 @@ void bind(py::module_& module, const char* name) {
       .def("add_particles",
            [](S& session, const Array& x, const Array& v, const Array& radius, const Array& mass, const Array& charge,
               const Array& spin, const std::string& species, double inertia) {
-             session.add_particles({.x = span_of(x),
-                                    .v = span_of(v),
-                                    .radius = span_of(radius),
-                                    .mass = span_of(mass),
-                                    .charge = span_of(charge),
-                                    .spin = span_of(spin),
-                                    .species = species,
-                                    .inertia = inertia});
+             session.add_particles({span_of(x), span_of(v), span_of(radius), span_of(mass), span_of(charge),
+                                    span_of(spin), species, inertia});
            })
       .def("set_position", [](S& session, const Array& x) { session.set_position(span_of(x)); })
       .def("set_velocity", [](S& session, const Array& v) { session.set_velocity(span_of(v)); })
@@ -196,12 +189,13 @@ void bind(py::module_& module, const char* name) {
              const auto values = which == "mass" ? all.mass : which == "radius" ? all.radius : all.charge;
              return view<double>(values.data(), values.size(), 0, self);
            })
-      .def_property_readonly("energy_error", number([](S& s) {
+      .def_property_readonly("energy_error",
+                             [](S& s) {
                                const double scale = s.statistics().energy_reference;
                                return scale > 0 ? s.shot().max_energy_error / scale : 0.0;
-                             }))
-      .def_property_readonly("force_passes", number([](S& s) { return s.statistics().force_passes; }))
-      .def_property_readonly("wall_seconds", number([](S& s) { return s.statistics().wall_seconds; }))
+                             })
+      .def_property_readonly("force_passes", [](const S& s) { return s.statistics().force_passes; })
+      .def_property_readonly("wall_seconds", [](const S& s) { return s.statistics().wall_seconds; })
       .def_property_readonly("interval", [](const S& s) { return s.plan().thermo_interval; })
       .def_property_readonly("size", &S::size)
       .def_property_readonly("directory", &S::directory)

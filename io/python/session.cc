@@ -478,7 +478,8 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
     rest(at_work_->particles);
   };
   try {
-    if (deck_) record_.emplace(*deck_, run, begun ? &head_ : nullptr);
+    if (deck_)
+      record_.emplace(*deck_, run, RecordOptions{.from = begun ? &head_ : nullptr, .continued = begun, .silent = true});
     run.add(*this);
     started = true;
     run.run(inner);

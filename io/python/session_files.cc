@@ -124,9 +124,8 @@ DeckValues Session<D>::deck(const std::string& of) {
     species.set(points ? "display_radius" : "radius", column(all.radius));
     species.set("charge", column(all.charge));
     if (box_.contacts.rough()) {
-      std::vector<Spin<D>> spin(views_.spin().begin(), views_.spin().end());
-      spin.resize(size_, Spin<D>::Zero());
-      species.set("spin", rows_of(std::span<const Spin<D>>(spin).subspan(begin, n)));
+      if (system_) system_->particles.spin.resize(size_, Spin<D>::Zero());
+      species.set("spin", rows_of(views_.spin().subspan(begin, n)));
       if (kind < inertias().size() && inertias()[kind] != 0) species.set("inertia", inertias()[kind]);
     }
     values.list("particles").push_back(table_of("particles", std::move(species)));
