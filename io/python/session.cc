@@ -26,22 +26,26 @@ double value_of(std::span<const double> values, std::size_t i, double fallback) 
   return values.empty() ? fallback : values[values.size() == 1 ? 0 : i];
 }
 
-template <int D>
-Vec<D> vector_at(std::span<const double> values, std::size_t i) {
-  return Eigen::Map<const Vec<D>>(values.data() + i * D);
+template <class T>
+T row_of(std::span<const double> values, std::size_t i) {
+  return Eigen::Map<const T>(values.data() + i * T::SizeAtCompileTime);
 }
 
+/// Rows of finite numbers.
 template <class T>
-void need_finite(std::span<const T> rows, const char* what) {
-  for (std::size_t i = 0; i < rows.size(); ++i) {
+std::vector<T> rows_of(std::span<const double> values, std::size_t count, const std::string& what) {
+  std::vector<T> rows(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    rows[i] = row_of<T>(values, i);
     if (!rows[i].allFinite())
-      throw Error(Failure::initial_state, std::string(what) + ": those of particle " + std::to_string(i) +
-                                              " are not finite; give finite numbers");
+      throw Error(Failure::initial_state,
+                  what + ": those of particle " + std::to_string(i) + " are not finite; give finite numbers");
     for (const double each : rows[i])
       if (const std::string error = beyond_limits(each); !error.empty())
         throw Error(Failure::initial_state,
-                    std::string(what) + ": a number of particle " + std::to_string(i) + " " + error);
+                    std::string(what).append(": a number of particle " + std::to_string(i) + " ").append(error));
   }
+  return rows;
 }
 
 /// Replaces the distance within which bonds were found by these bonds.
@@ -86,8 +90,8 @@ Session<D>::Session(Deck& deck, const std::optional<GivenState>& given, const Pa
 
 /// To be called before any change.
 template <int D>
-void Session<D>::change(const char* what) {
-  if (running_) refuse("a run is going on; " + std::string(what) + " before it or after it");
+void Session<D>::change(const std::string& what) {
+  if (running_) refuse("a run is going on; " + what + " before it or after it");
   state_.clear();
   failure_.clear();
   shot_.reset();
@@ -129,15 +133,14 @@ void Session<D>::add_particles(const Columns& columns) {
     const Particle<D> fallback{.x = Vec<D>::Zero()};
     for (std::size_t i = 0; i < added; ++i) {
       const std::size_t id = before + i;
-      all.x[id] = vector_at<D>(columns.x, i);
-      all.v[id] = columns.v.empty() ? fallback.v : vector_at<D>(columns.v, i);
+      all.x[id] = row_of<Vec<D>>(columns.x, i);
+      all.v[id] = columns.v.empty() ? fallback.v : row_of<Vec<D>>(columns.v, i);
       all.image[id] = {};
       all.mass[id] = value_of(columns.mass, i, fallback.mass);
       all.radius[id] = value_of(columns.radius, i, fallback.radius);
       all.charge[id] = value_of(columns.charge, i, fallback.charge);
       all.species[id] = kind;
-      if (!columns.spin.empty())
-        all.spin[id] = Eigen::Map<const Spin<D>>(columns.spin.data() + i * Spin<D>::SizeAtCompileTime);
+      if (!columns.spin.empty()) all.spin[id] = row_of<Spin<D>>(columns.spin, i);
     }
     system_->check();
     for (const auto& [what, numbers] : {std::pair{"position", columns.x},
@@ -174,9 +177,7 @@ void Session<D>::set_velocity(std::span<const double> v) {
       refuse(
           "velocities: an epoch of free flight is going on; choose epochs that end where the callback comes: "
           "integrator(\"free-flight\", step=every)");
-    pushed_.resize(size_);
-    for (std::size_t i = 0; i < size_; ++i) pushed_[i] = vector_at<D>(v, i);
-    need_finite<Vec<D>>(pushed_, "velocities");
+    pushed_ = rows_of<Vec<D>>(v, size_, "velocities");
     return;
   }
   set(&Particles<D>::v, v, "velocities");
@@ -201,33 +202,29 @@ void Session<D>::set_inertia(const std::string& species, double inertia) {
 
 template <int D>
 template <class T>
-void Session<D>::set(std::vector<T> Particles<D>::*member, std::span<const double> values, const char* what) {
-  change(("set " + std::string(what)).c_str());
-  constexpr std::size_t kEach = T::SizeAtCompileTime;
-  std::vector<T> rows(size_);
-  for (std::size_t i = 0; i < size_; ++i) rows[i] = Eigen::Map<const T>(values.data() + i * kEach);
-  need_finite<T>(rows, what);
-  std::ranges::copy(rows, (system_->particles.*member).begin());
+void Session<D>::set(std::vector<T> Particles<D>::*member, std::span<const double> values, const std::string& what) {
+  change("set " + what);
+  std::ranges::copy(rows_of<T>(values, size_, what), (system_->particles.*member).begin());
 }
 
 template <int D>
 void Session<D>::take(Session& placed) {
   System<D>& system = *placed.system_;
+  make_terms(system);  // if this throws, nothing has changed
   change("place particles");
   warned_ = false;
   const Box<D> before = std::exchange(box_, placed.box_);
   box_.contacts.inertias = before.contacts.inertias;
   box_.bath = before.bath;
   system.box = box_;
+  views_.detach(system_->particles);
   system.particles.spin = std::move(system_->particles.spin);
   if (!system.particles.spin.empty()) system.particles.spin.resize(placed.size_, Spin<D>::Zero());
-  views_.detach(system_->particles);
   system_ = std::move(placed.system_);
   views_.rest(system_->particles);
   species_ = placed.species_;
   size_ = placed.size_;
   values_.list("system") = placed.values_.list("system");
-  make_terms(*system_);
 }
 
 template <int D>

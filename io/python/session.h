@@ -111,7 +111,7 @@ class Session : Observer<D> {
   const Plan& plan() const { return plan_; }
 
  private:
-  void change(const char* what);
+  void change(const std::string& what);
   void need_state_at_end(const char* what) const;
   double present() const { return showing_ ? shot_->time : statistics().end_time; }
   void set_wall(Parameters given);
@@ -120,7 +120,7 @@ class Session : Observer<D> {
   void set_contacts(std::vector<ValueTable> all);
   void make_terms(System<D>& system);
   template <class T>
-  void set(std::vector<T> Particles<D>::*member, std::span<const double> values, const char* what);
+  void set(std::vector<T> Particles<D>::*member, std::span<const double> values, const std::string& what);
   bool reached(const Plan& plan) const;
   Bytes saved(const std::string& name, double interval) const;
   void rest(Particles<D>& particles);

@@ -59,11 +59,16 @@ def test_walls_contacts_baths_and_files_stay_when_particles_are_placed(tmp_path)
     assert sim.work > 0 and sim.dissipated > 0 and sim.heat != 0 and len(sim.open().frames) == 2
 
 
-def test_species_keep_their_inertia_when_others_are_placed():
+def test_species_keep_their_inertia_and_views_what_they_showed_when_others_are_placed():
     sim = carom.Simulation(box=[8, 8])
-    sim.add_particles([[2, 2]], radius=0.5, species="ring", inertia=0.9)
+    sim.add_particles([[2, 2]], radius=0.5, species="ring", inertia=0.9, spin=[1.5])
     sim.add_particles(count=3, temperature=1.0, radius=0.5, inertia=0.6)
+    views = [sim.position, sim.velocity, sim.spin, sim.mass]
+    copies = [view.copy() for view in views]
     sim.place("random")
+    np.full(100000, np.nan)
+    assert all(np.array_equal(view, copy) for view, copy in zip(views, copies))
+    assert sim.spin.tolist() == [1.5, 0, 0, 0] and sim.position[0].tolist() == [2, 2] and len(sim) == 4
     sim.add_contact("*", "*", tangential=0.5)
     sim.spin = [1.0, 0.0, 0.0, 2.0]
     assert sim.rotational_energy == pytest.approx(0.5 * 0.5**2 * (0.9 * 1.0**2 + 0.6 * 2.0**2))

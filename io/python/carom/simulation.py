@@ -62,7 +62,7 @@ class Simulation:
             raise UsageError(f"Simulation: 'box' has shape {edges.shape}; give 2 or 3 edges")
         if dimension not in (None, len(edges)):
             raise UsageError(f"Simulation: 'dimension' is {dimension!r}, but 'box' has {len(edges)} edges; leave one of them out")
-        rules = [boundary] * len(edges) if isinstance(boundary, str) else list(boundary)
+        rules = [boundary] if isinstance(boundary, str) else list(boundary)
         if not all(isinstance(rule, str) for rule in rules) or len(rules) not in (1, len(edges)):
             raise UsageError(f"Simulation: 'boundary' is {boundary!r}; give one name, or one for each of {len(edges)} axes")
         kind = _carom.Session2 if len(edges) == 2 else _carom.Session3
@@ -358,7 +358,7 @@ class Simulation:
 
     def _set_output(self, output):
         self._session.set_output([f"output.{key}={toml_value(value)}" for key, value in output.items()],
-                           float(output.get("thermo_interval", 0)))
+                                 float(output.get("thermo_interval", 0)))
         self._output = output
 
     @property
@@ -497,9 +497,9 @@ class Simulation:
                               "the last row or callback; between runs those of the last one.")
     boundary = property(lambda self: self._table("system")["boundary"], doc="The name of the boundary on each axis.")
 
-    title, description = (property(lambda self, key=key: self._table("")[key],
-                                   lambda self, text, key=key: self._session.set("", self._table("") | {key: text}),
-                                   doc=f"The {key} in decks and files.") for key in ("title", "description"))
+    title, description = (
+        property(lambda self, key=key: self._table("")[key], lambda self, text, key=key: self._session.set("", self._table("") | {key: text}),
+                 doc=f"The {key} in decks and files.") for key in ("title", "description"))
 
     energy_error = property(lambda self: self._session.energy_error,
                             doc="The largest change of H + dissipated - work - heat since the first step, over max(|H_1|, K_1 + sum |V|).")
