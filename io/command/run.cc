@@ -16,17 +16,11 @@
 #include "io/command/requests.h"
 #include "io/command/resume.h"
 #include "io/deck/deck.h"
-#include "io/files/checkpoint.h"
-#include "io/files/directory_lock.h"
 #include "io/files/hdf5.h"
-#include "io/files/log.h"
-#include "io/files/log_report.h"
 #include "io/files/output_directory.h"
 #include "io/files/progress.h"
-#include "io/files/run_files.h"
-#include "io/files/summary.h"
+#include "io/files/run_record.h"
 #include "io/files/text_file.h"
-#include "io/files/version.h"
 #include "io/view/view.h"
 #include "parallel/world.h"
 
@@ -38,7 +32,6 @@ constexpr int kDone = 0, kStoppedEarly = 75;
 
 /// Computing the forces on fewer particles than this costs less than sending them.
 constexpr std::size_t kFewestToShare = 64;
-constexpr std::size_t kFewPerRank = 500;  // below this, most events are run twice (parallel/README.md)
 
 /// Calls between two checks for requests within a step (one call per piece, sweep or contact) in large systems.
 constexpr std::uint64_t kCallsWithinSteps = 32;
@@ -106,111 +99,34 @@ int run_deck(Deck& deck, const RunOptions& options, Communicator& at_work, int r
              Resumed* from) {
   const auto& directory = deck.output.directory;
   auto simulation = simulation_of<D>(deck, at_work, requests, from);
-  Resumed* const continued = from && from->is_continued() ? from : nullptr;
   const Statistics& statistics = simulation.statistics();
-  const auto lock = continued ? std::move(continued->lock) : std::make_unique<DirectoryLock>(directory);
-  const auto backup = continued ? std::nullopt : prepare_output_directory(directory, deck.output.overwrite);
-  // The next checkpoint replaces the damaged one, not the good one.
-  if (const auto last = directory / run_file::checkpoint; continued && continued->checkpoint->file() != last)
-    rename_file(continued->checkpoint->file(), last);
-  RunLog log(directory / run_file::log, options.quiet, continued ? std::optional(continued->head.log) : std::nullopt);
-  RunOutcome outcome{
-      .status = "done", .warnings = deck.warnings, .particles = simulation.system().size(), .ranks = ranks};
-  if (from) outcome.branched_from = from->head.branched_from;
-  if (continued) {
-    log.say(fmt::format("continued at step {} on {} {}", continued->head.step, ranks, ranks == 1 ? "rank" : "ranks"));
-  } else {
-    log.say(banner_text(deck, outcome.particles, ranks));
-    if (from)
-      log.say(fmt::format("branched from {} at step {}, time {:g}", from->head.branched_from, from->head.step,
-                          from->head.time));
-    for (const std::string& warning : deck.warnings) log.warn(warning);
+  RecordOptions of_record{.at_work = &at_work, .ranks = ranks, .quiet = options.quiet};
+  if (from) of_record.from = &from->head, of_record.warning = from->warning;
+  if (from && from->is_continued()) {
+    of_record.continued = true;
+    of_record.lock = std::move(from->lock);
+    // The next checkpoint replaces the damaged one, not the good one.
+    if (const auto last = directory / run_file::checkpoint; from->checkpoint->file() != last)
+      rename_file(from->checkpoint->file(), last);
   }
-  if (from && !from->warning.empty()) log.warn("warning: " + from->warning);
-  if (at_work.size() < ranks)
-    log.warn(
-        fmt::format("warning: {} particles under forces are too few to be shared; one rank works, the other {} wait",
-                    outcome.particles, ranks - 1));
-  else if (ranks > 1 && outcome.particles < kFewPerRank * static_cast<std::size_t>(ranks))
-    log.say(
-        fmt::format("hint: {} particles on {} ranks are few for each; fewer ranks may be faster (parallel/README.md)",
-                    outcome.particles, ranks));
-  if (!lock->warning().empty()) log.warn(lock->warning());
-  if (backup) log.warn("warning: the files of an earlier run in this directory are now in " + backup->string());
-  const std::string origin =
-      outcome.branched_from.empty()
-          ? ""
-          : fmt::format("# A branch of {}: it started from the particles there.\n", outcome.branched_from);
-  write_file_atomically(directory / run_file::deck, origin + deck.toml_text);
-
-  const auto summary = [&] {
-    outcome.walls = WallRecord::all(simulation.system().box);
-    write_file_atomically(directory / run_file::summary, summary_text(deck, outcome, statistics));
-  };
-  std::optional<RunFiles<D>> files;
-  ThermoTable<D> table(log, continued ? continued->head.log_rows : 0);
+  RunRecord<D> record(deck, simulation, std::move(of_record));
   Progress<D> progress(stdout, isatty(STDOUT_FILENO) == 1);
   try {
-    files.emplace(deck, simulation.system(), continued ? std::optional(continued->head.files) : std::nullopt);
-    files->add_to(simulation);
-    simulation.add(table);
     if (!options.quiet) simulation.add(progress);
-    const auto bonds = from ? from->head.bonds : found_bonds(deck, simulation.system());
-    RunControl<D> control(simulation, deck, at_work, requests, [&] {
-      return CheckpointHead{.deck = deck.toml_text,
-                            .deck_file = deck.file.string(),
-                            .version = version_string(),
-                            .integrator = deck.integrator,
-                            .dimension = D,
-                            .particles = outcome.particles,
-                            .step = statistics.steps,
-                            .time = statistics.end_time,
-                            .files = files->mark(),
-                            .log = log.mark(),
-                            .log_rows = table.rows(),
-                            .bonds = bonds,
-                            .warnings = deck.warnings,
-                            .branched_from = outcome.branched_from};
-    });
+    RunControl<D> control(simulation, deck, at_work, requests, [&] { return record.head(); });
     simulation.run(control.hooks(from));
     progress.end_line();
-    table.finish();
-    const auto accounts = accounts_of_all(at_work, statistics);
-    files->close();
-    outcome.species_values = files->species_values();
-    outcome.peak_memory_bytes = peak_memory_bytes(accounts);
-    if (statistics.stopped_early) outcome.status = "interrupted";
-    log.say(report_text(deck, statistics, accounts));
-    for (const std::string& warning : warnings_about(deck, statistics, simulation.system().box)) {
-      outcome.warnings.push_back(warning);
-      log.warn(warning);
-    }
-    if (const auto subdomains = statistics.counters.windows.subdomains;
-        subdomains > 0 && subdomains < static_cast<unsigned>(ranks))
-      log.warn(fmt::format("warning: there is work for {} of {} ranks only; use so many", subdomains, ranks));
-    if (statistics.stopped_early)
-      log.warn(fmt::format("stopped by {}; carom run --continue {} goes on", requests.reason(), directory.string()));
-    log.close();
-    summary();
+    record.close(statistics.stopped_early ? fmt::format("stopped by {}; carom run --continue {} goes on",
+                                                        requests.reason(), directory.string())
+                                          : "");
   } catch (const std::exception& e) {
-    // Files first: closing them frees the space they had reserved on a disk that may be full.
     progress.end_line();
-    outcome.status = "failed";
-    outcome.error = e.what();
-    const auto overlap = overlap_warning(statistics, simulation.system().box);
-    if (overlap) outcome.warnings.push_back(*overlap);
-    if (files) files->close_after_failure();
-    at_best(summary);
-    at_best([&] { table.finish(); });
-    at_best([&] {
-      if (overlap) log.warn(*overlap);
-      log.error(e.what());
-    });
+    record.fail(e.what());
     throw;
   }
   if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
-    throw Error(Failure::file, "standard output: cannot write to it; the files of the run are complete in " +
-                                   deck.output.directory.string());
+    throw Error(Failure::file,
+                "standard output: cannot write to it; the files of the run are complete in " + directory.string());
   return statistics.stopped_early ? kStoppedEarly : kDone;
 }
 

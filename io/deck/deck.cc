@@ -106,8 +106,8 @@ Deck read_branch(const Deck& of, std::span<const std::string> overrides, const T
                      "give the bonds as 'pairs', or leave 'within' as it is");
   }
   const auto ramp = [](const Deck& each) {
-    const auto& baths = each.source->baths;
-    return baths.empty() ? nullptr : baths[0].parameters.find<std::vector<double>>("temperature");
+    const ValueTable* bath = each.source->values.find("bath");
+    return bath ? bath->find<std::vector<double>>("temperature") : nullptr;
   };
   const auto sets_ramp_time = [](const std::string& set) { return set.find(".ramp_time=") != std::string::npos; };
   if (ramp(of) && ramp(deck) && *ramp(of) != *ramp(deck) && std::ranges::none_of(overrides, sets_ramp_time))

@@ -150,17 +150,17 @@ template <int D>
 void fill_box(const Deck::Source& source, System<D>& system) {
   std::copy_n(source.boundary.begin(), D, system.box.boundary.begin());
   if (!source.edges.empty()) std::copy_n(source.edges.begin(), D, system.box.edges.begin());
-  for (const TableConfig& wall : source.walls)
-    if (!wall.wrong) add_wall(system.box, wall.parameters, source.placement.seed);
-  for (const TableConfig& bath : source.baths)
-    if (!bath.wrong) system.box.bath = bath_of(bath.parameters, source.placement.seed);
+  for (const ValueTable& wall : source.values.list("wall"))
+    if (!wall.wrong) add_wall(system.box, wall.values, source.placement.seed);
+  for (const ValueTable& bath : source.values.list("bath"))
+    if (!bath.wrong) system.box.bath = bath_of(bath.values, source.placement.seed);
   system.species.clear();
   for (const SpeciesConfig& species : source.species) {
     system.species.push_back(species.name);
     system.box.contacts.inertias.push_back(species.inertia);
   }
-  for (const TableConfig& contact : source.contacts)
-    if (!contact.wrong) add_contact<D>(system.box, system.species, contact.parameters);
+  for (const ValueTable& contact : source.values.list("contact"))
+    if (!contact.wrong) add_contact<D>(system.box, system.species, contact.values);
 }
 
 template <int D>

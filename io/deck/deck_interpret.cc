@@ -28,10 +28,7 @@ class Interpreter {
   void all() {
     top();
     system();
-    for (const ValueTable& table : values_.list("wall")) source_.walls.push_back({table.values, table.at, table.wrong});
-    for (const ValueTable& table : values_.list("contact"))
-      source_.contacts.push_back({table.values, table.at, table.wrong});
-    for (const ValueTable& table : values_.list("bath")) bath({table.values, table.at, table.wrong});
+    bath();
     for (const ValueTable& table : values_.list("particles")) species(table);
     try_walls();
     placement();
@@ -83,24 +80,27 @@ class Interpreter {
       std::copy_n(source_.boundary.begin(), dimension_, box.boundary.begin());
       std::vector<std::string> names;
       for (const SpeciesConfig& species : source_.species) names.push_back(species.name);
-      for (TableConfig& wall : source_.walls)
-        if (!wall.wrong) wall.wrong = report(wall.at, [&] { add_wall(box, wall.parameters); });
-      for (TableConfig& contact : source_.contacts)
+      auto& walls = values_.list("wall");
+      for (ValueTable& wall : walls)
+        if (!wall.wrong) wall.wrong = report(wall.at, [&] { add_wall(box, wall.values); });
+      for (ValueTable& contact : values_.list("contact"))
         if (!contact.wrong && !names.empty())
-          contact.wrong = report(contact.at, [&] { add_contact(box, names, contact.parameters); });
-      if (source_.edges.size() != dimension_ || source_.walls.empty()) return;
+          contact.wrong = report(contact.at, [&] { add_contact(box, names, contact.values); });
+      if (source_.edges.size() != dimension_ || walls.empty()) return;
       std::copy_n(source_.edges.begin(), dimension_, box.edges.begin());
-      report(source_.walls.back().at, [&] { box.check(Failure::deck); });
+      report(walls.back().at, [&] { box.check(Failure::deck); });
     };
     if (source_.boundary.size() != dimension_) return;
     if (dimension_ == 2) attempt(Box<2>());
     if (dimension_ == 3) attempt(Box<3>());
   }
 
-  void bath(TableConfig config) {
-    if (!config.wrong) config.wrong = report(config.at, [&] { bath_of(config.parameters); });
-    if (!source_.baths.empty()) problems_.error(config.at, "a second [[bath]]", "give one; it acts on all particles");
-    source_.baths.push_back(std::move(config));
+  void bath() {
+    auto& all = values_.list("bath");
+    for (ValueTable& each : all) {
+      if (!each.wrong) each.wrong = report(each.at, [&] { bath_of(each.values); });
+      if (&each != &all.front()) problems_.error(each.at, "a second [[bath]]", "give one; it acts on all particles");
+    }
   }
 
   /// Reports the error that `work` throws, with the form "what; what to do", at this place; returns whether it throws.
@@ -445,10 +445,11 @@ class Interpreter {
     table->read<std::int64_t>("collisions", deck_.plan.collisions);
     for (const char* key : {"steps", "end_time", "collisions"})
       if (table->given(key) && !table->values.has(key)) return;  // a problem of its own
-    const auto ramp = std::ranges::find_if(source_.baths, [](const TableConfig& bath) {
-      return bath.parameters.find<std::vector<double>>("temperature") && !bath.parameters.has("ramp_time");
+    const auto& baths = values_.list("bath");
+    const auto ramp = std::ranges::find_if(baths, [](const ValueTable& bath) {
+      return bath.find<std::vector<double>>("temperature") && !bath.values.has("ramp_time");
     });
-    const EndlessRun why = endless(deck_.plan, source_.integrator, ramp != source_.baths.end());
+    const EndlessRun why = endless(deck_.plan, source_.integrator, ramp != baths.end());
     if (why.what.empty()) return;
     problems_.error(why.cause == EndlessRun::Cause::run          ? table->at
                     : why.cause == EndlessRun::Cause::collisions ? table->place("collisions")

@@ -45,19 +45,11 @@ struct InteractionConfig {
   bool wrong = false;  ///< a problem with it has been reported
 };
 
-/// A table that is a list of parameters: [[wall]], [[contact]], [[bath]].
-struct TableConfig {
-  Parameters parameters;
-  Place at;
-  bool wrong = false;  ///< a problem with it has been reported
-};
-
 struct Deck::Source {
   DeckValues values;
   Place system, box, step;
   std::vector<double> edges;  ///< empty: the packing fraction sets them
   std::vector<Boundary> boundary;
-  std::vector<TableConfig> walls, contacts, baths;
   std::vector<SpeciesConfig> species;
   PlacementConfig placement;
   std::vector<InteractionConfig> interactions;

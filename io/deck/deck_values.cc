@@ -394,6 +394,21 @@ Parameters ValueTable::of_variant() const {
   return own;
 }
 
+ValueTable table_of(std::string_view name, Parameters given) {
+  ValueTable table;
+  table.schema = &table_schema(name);
+  if (table.schema->variants.empty()) {
+    table.values = completed(name, table.schema->keys, std::move(given));
+    return table;
+  }
+  const std::string type = given.text("type");
+  table.variant = &find_named(table.schema->variants, name, type);
+  given.erase("type");
+  table.values = completed(type, table.variant->keys, std::move(given));
+  table.values.set("type", type);
+  return table;
+}
+
 DeckValues read_values(const std::filesystem::path& file, std::string_view text, std::span<const std::string> overrides,
                        bool replace, Problems& problems) {
   DeckToml deck;

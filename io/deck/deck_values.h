@@ -75,6 +75,10 @@ struct DeckValues {
 DeckValues read_values(const std::filesystem::path& file, std::string_view text, std::span<const std::string> overrides,
                        bool replace, Problems& problems);
 
+/// A table that a program makes, completed by defaults; if `type` chooses a variant, of the keys that it adds. Throws
+/// Error(Failure::deck).
+ValueTable table_of(std::string_view name, Parameters given);
+
 /// The values as a deck again, in the order of the schema; numbers have the fewest digits that reproduce them exactly.
 std::string write_deck(const DeckValues& values);
 

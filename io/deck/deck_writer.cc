@@ -38,24 +38,11 @@ std::string literal(const std::string& value) {
   return text + "\"";
 }
 
-template <class Item>
-std::string literal(const std::vector<Item>& items);
-template <class Item, std::size_t N>
-std::string literal(const std::array<Item, N>& items);
-
-template <class Items>
-std::string bracketed(const Items& items) {
+/// A list of any of these, or of lists.
+std::string literal(const auto& items) {
   std::string text;
   for (const auto& item : items) text += (text.empty() ? "" : ", ") + literal(item);
   return "[" + text + "]";
-}
-template <class Item>
-std::string literal(const std::vector<Item>& items) {
-  return bracketed(items);
-}
-template <class Item, std::size_t N>
-std::string literal(const std::array<Item, N>& items) {
-  return bracketed(items);
 }
 
 std::string literal(const TableValue& table) {

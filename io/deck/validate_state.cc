@@ -77,7 +77,8 @@ void check_bath(const Deck::Source& source, const System<D>& system, Problems& p
       std::ranges::count_if(system.particles.v, [](const Vec<D>& v) { return v != Vec<D>::Zero(); }));
   system.decomposition.ranks().sum({&moving, 1});
   if (moving == 0)
-    problems.error(source.baths[0].at, "a rescaling bath multiplies velocities, and all particles are at rest",
+    problems.error(source.values.find("bath")->at,
+                   "a rescaling bath multiplies velocities, and all particles are at rest",
                    "give the particles a temperature above 0, or take type = \"andersen\"");
 }
 

@@ -33,7 +33,7 @@ void RunLog::say(std::string_view text) {
 }
 
 void RunLog::warn(std::string_view text) {
-  show(stderr, text);
+  if (!silent_) show(stderr, text);
   note(text);
 }
 

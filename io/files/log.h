@@ -19,9 +19,9 @@ namespace carom {
 class RunLog {
  public:
   /// Creates the file, or opens it again and continues from the mark. `quiet`: only warnings and errors go to the
-  /// terminal.
-  RunLog(const std::filesystem::path& path, bool quiet, const std::optional<FileMark>& mark = {})
-      : file_(path, mark), quiet_(quiet) {}
+  /// terminal. `silent`: nothing does.
+  RunLog(const std::filesystem::path& path, bool quiet, const std::optional<FileMark>& mark = {}, bool silent = false)
+      : file_(path, mark), quiet_(quiet || silent), silent_(silent) {}
 
   void note(std::string_view text);   ///< to the file
   void say(std::string_view text);    ///< to the file and to stdout
@@ -34,7 +34,7 @@ class RunLog {
  private:
   TextFile file_;
   std::string day_;  // of the last line, which the next ones need not repeat
-  bool quiet_;
+  bool quiet_, silent_;
 };
 
 }  // namespace carom

@@ -60,7 +60,7 @@ PROPERTIES = {"position": "npt.NDArray[np.float64]", "velocity": "npt.NDArray[np
               "box": "list[float]", "boundary": "list[str]", "walls": "list[dict[str, Any]]", "contacts": "list[dict[str, Any]]",
               "wall_loads": "dict[str, float]",
               "bath": "dict[str, Any] | None", "bath_temperature": "float | list[float] | None",
-              "step": "int", "collisions": "int", "directory": "str | None",
+              "title": "str", "description": "str", "step": "int", "collisions": "int", "directory": "str | None",
               "means": "dict[str, dict[str, float]]",
               "averages": "dict[str, dict[str, npt.NDArray[np.float64]]]"}
 VALUES = {"list[float]": "npt.ArrayLike", "list[str]": "Sequence[str]", "list[tuple[int, int]]": "npt.ArrayLike"}
@@ -111,7 +111,6 @@ def lines():
     yield ""
     yield "class Simulation:"
     yield from text_of(simulation.Simulation.__doc__, "    ")
-    yield "    title: str"
     yield "    warnings: list[str]"
     yield "    bonds: npt.NDArray[np.int64]"
     for name, member in vars(simulation.Simulation).items():

@@ -10,11 +10,7 @@
 #include <utility>
 
 #include "engine/forces/potentials/table.h"
-#include "engine/laws/bath_options.h"
 #include "engine/laws/boundary.h"
-#include "engine/laws/contact_options.h"
-#include "engine/laws/wall_options.h"
-#include "io/deck/schema.h"
 #include "io/files/thermo.h"
 #include "io/files/version.h"
 #include "io/python/python_lock.h"
@@ -39,17 +35,6 @@ py::array view(const void* data, std::size_t rows, int columns, const py::object
   return array;
 }
 
-/// An array of vectors; one axis if each is one number.
-template <class V>
-Array array_of(const std::vector<V>& all) {
-  constexpr int columns = V::SizeAtCompileTime;
-  std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(all.size())};
-  if (columns > 1) shape.push_back(columns);
-  Array array(shape);
-  for (std::size_t i = 0; i < all.size(); ++i) std::copy_n(all[i].begin(), columns, array.mutable_data() + i * columns);
-  return array;
-}
-
 Plan plan_of(const py::dict& ends, double every) {
   using enum Parameter::Type;
   using enum Parameter::Range;
@@ -71,8 +56,7 @@ Plan plan_of(const py::dict& ends, double every) {
 /// the end of Python.
 template <int D>
 void run(Session<D>& session, const Plan& plan, const py::object& callback, const py::object& progress,
-         const py::object& deck, const std::string& script) {
-  std::string text = session.needs_deck() ? py::cast<std::string>(deck(session.writes_files())) : "";
+         const std::string& script) {
   using Clock = std::chrono::steady_clock;
   constexpr std::chrono::milliseconds kTimeBetweenChecks(50);
   std::optional<py::error_already_set> raised;
@@ -85,7 +69,6 @@ void run(Session<D>& session, const Plan& plan, const py::object& callback, cons
   auto last_look = Clock::now();
   bool cut = false;
   RunHooks hooks;
-  hooks.deck = [&] { return text; };
   hooks.script = script;
   hooks.stop = [&](const Statistics& statistics) {
     cut = cut || python_is_ending();
@@ -126,70 +109,47 @@ py::object value_of(const Column<D>& column, const Snapshot<D>& shot) {
 template <int D>
 void bind(py::module_& module, const char* name) {
   using S = Session<D>;
-  const auto number = [](double (*get)(S&)) { return [get](S& session) { return get(session); }; };
+  using V = ParticleViews<D>;
+  const auto rows = [](auto get, int columns) {
+    return [get, columns](const py::object& self) {
+      const auto all = (self.cast<S&>().views().*get)();
+      return view<typename decltype(all)::value_type::value_type>(all.data(), all.size(), columns, self);
+    };
+  };
   py::class_<S> session_type(module, name);
   for (const Column<D>& column : columns<D>())
     if (column.python)
       session_type.def_property_readonly(column.python, [&column](S& s) { return value_of(column, s.shot()); });
-  session_type
-      .def(py::init([](const std::vector<double>& edges, const std::vector<std::string>& boundary) {
-        return std::make_unique<S>(edges, boundary);
-      }))
+  session_type.def(py::init<const std::vector<double>&, const std::vector<std::string>&>())
       .def("add_particles",
            [](S& session, const Array& x, const Array& v, const Array& radius, const Array& mass, const Array& charge,
               const Array& spin, const std::string& species, double inertia) {
-             session.add_particles({.x = span_of(x),
-                                    .v = span_of(v),
-                                    .radius = span_of(radius),
-                                    .mass = span_of(mass),
-                                    .charge = span_of(charge),
-                                    .spin = span_of(spin),
-                                    .species = species,
-                                    .inertia = inertia});
+             session.add_particles({span_of(x), span_of(v), span_of(radius), span_of(mass), span_of(charge),
+                                    span_of(spin), species, inertia});
            })
       .def("set_position", [](S& session, const Array& x) { session.set_position(span_of(x)); })
       .def("set_velocity", [](S& session, const Array& v) { session.set_velocity(span_of(v)); })
       .def("set_spin", [](S& session, const Array& spin) { session.set_spin(span_of(spin)); })
       .def("set_inertia", &S::set_inertia)
-      .def("add_wall",
-           [](S& session, const py::dict& given) { session.add_wall(parameters_of("wall", wall_parameters(), given)); })
-      .def("set_bath",
-           [](S& session, const py::dict& given) { session.set_bath(parameters_of("bath", bath_parameters(), given)); })
-      .def("set_bath_temperature", [](S& session, double temperature) { session.set_bath_temperature(temperature); })
-      .def("add_contact",
-           [](S& session, const py::dict& given) {
-             session.add_contact(parameters_of("contact", contact_parameters(), given));
-           })
-      .def("add_force",
-           [](S& session, const std::string& type, const py::dict& given) {
-             const InteractionInfo& info = find_interaction(type);
-             session.add_force(type, parameters_of(info.name, info.parameters, given));
-           })
-      .def("set_integrator",
-           [](S& session, const std::string& type, const py::dict& given) {
-             const IntegratorInfo& info = find_integrator(type);
-             session.set_integrator(type, parameters_of(info.name, info.parameters, given));
-           })
+      .def("set", [](S& session, const std::string& table,
+                     const py::dict& given) { session.set(table, parameters_of(table_schema(table), given)); })
+      .def("set_bath_temperature", &S::set_bath_temperature)
+      .def("take", &S::take)
       .def("run",
            [](S& session, const py::dict& ends, const py::object& callback, const py::object& progress,
-              const py::object& deck, const std::string& script) {
+              const std::string& script) {
              Plan plan = plan_of(ends, session.plan().thermo_interval);
              if (!plan.end_time && !plan.steps && !plan.collisions) {
                plan.end_time = session.plan().end_time;
                plan.steps = session.plan().steps;
                plan.collisions = session.plan().collisions;
              }
-             run(session, plan, callback, progress, deck, script);
+             run(session, plan, callback, progress, script);
            })
       .def("set_output", &S::set_output)
       .def_property_readonly("begun", &S::begun)
-      .def("forget_run", &S::forget_run)
-      .def("drawn_velocities",
-           [](S& session, const Array& temperature, std::uint64_t seed) {
-             return array_of(session.drawn_velocities(span_of(temperature), seed));
-           })
-      .def("drawn_spins", [](S& session, const Array& temperature,
-                             std::uint64_t seed) { return array_of(session.drawn_spins(span_of(temperature), seed)); })
+      .def("draw", [](S& session, const Array& temperature, std::uint64_t seed,
+                      bool spins) { session.draw(span_of(temperature), seed, spins); })
       .def("means",
            [](const S& session) {
              py::dict all;
@@ -217,95 +177,66 @@ void bind(py::module_& module, const char* name) {
              }
              return all;
            })
-      .def("position",
-           [](const py::object& self) {
-             const auto x = self.cast<S&>().position();
-             return view<double>(x.data(), x.size(), D, self);
-           })
-      .def("velocity",
-           [](const py::object& self) {
-             const auto v = self.cast<S&>().velocity();
-             return view<double>(v.data(), v.size(), D, self);
-           })
-      .def("image",
-           [](const py::object& self) {
-             const auto image = self.cast<S&>().image();
-             return view<std::int32_t>(image.data(), image.size(), D, self);
-           })
-      .def("spin",
-           [](const py::object& self) {
-             const auto spin = self.cast<S&>().spin();
-             return view<double>(spin.data(), spin.size(), D == 2 ? 0 : 3, self);
-           })
+      .def("position", rows(&V::position, D))
+      .def("velocity", rows(&V::velocity, D))
+      .def("image", rows(&V::image, D))
+      .def("spin", rows(&V::spin, D == 2 ? 0 : D))
       .def_property_readonly("inertias", &S::inertias)
       .def("constant",
            [](const py::object& self, const std::string& which) -> py::array {
-             const Constants all = self.cast<S&>().constants();
+             const Constants all = self.cast<S&>().views().constants();
              if (which == "species") return view<std::uint16_t>(all.species.data(), all.species.size(), 0, self);
              const auto values = which == "mass" ? all.mass : which == "radius" ? all.radius : all.charge;
              return view<double>(values.data(), values.size(), 0, self);
            })
-      .def_property_readonly("energy_error", number([](S& s) {
+      .def_property_readonly("energy_error",
+                             [](S& s) {
                                const double scale = s.statistics().energy_reference;
                                return scale > 0 ? s.shot().max_energy_error / scale : 0.0;
-                             }))
-      .def_property_readonly("force_passes", number([](S& s) { return s.statistics().force_passes; }))
-      .def_property_readonly("wall_seconds", number([](S& s) { return s.statistics().wall_seconds; }))
+                             })
+      .def_property_readonly("force_passes", [](const S& s) { return s.statistics().force_passes; })
+      .def_property_readonly("wall_seconds", [](const S& s) { return s.statistics().wall_seconds; })
       .def_property_readonly("interval", [](const S& s) { return s.plan().thermo_interval; })
       .def_property_readonly("size", &S::size)
       .def_property_readonly("directory", &S::directory)
-      .def_property_readonly("deck_output", [](const S& s) { return values_of(s.deck_output()); })
       .def_property_readonly("warnings", &S::warnings)
       .def_property_readonly("species", &S::species)
       .def_property_readonly("method",
                              [](const S& s) { return std::string(s.integrator() ? s.integrator()->name : ""); })
-      .def_property_readonly("method_parameters", [](const S& s) { return values_of(s.integrator_parameters()); })
       .def_property_readonly("forces",
                              [](const S& s) {
                                py::list all;
-                               for (const Force& force : s.forces())
-                                 all.append(py::make_tuple(force.info->name, values_of(force.parameters)));
+                               for (const ValueTable& force : s.tables("interaction"))
+                                 all.append(py::make_tuple(force.variant->name, values_of(force.of_variant())));
                                return all;
                              })
-      .def_property_readonly("walls",
-                             [](const S& s) {
-                               py::list all;
-                               for (const Parameters& wall : s.walls()) all.append(values_of(wall));
-                               return all;
-                             })
-      .def_property_readonly("wall_loads", &S::wall_loads)
-      .def_property_readonly("contacts",
-                             [](const S& s) {
-                               py::list all;
-                               for (const Parameters& contact : s.contacts()) all.append(values_of(contact));
-                               return all;
-                             })
-      .def_property_readonly("baths",
-                             [](const S& s) {
-                               py::list all;
-                               for (const Parameters& bath : s.baths()) all.append(values_of(bath));
-                               return all;
-                             })
-      .def_property_readonly("box",
-                             [](const S& s) {
-                               const Vec<D>& edges = s.box().edges;
-                               return std::vector<double>(edges.begin(), edges.end());
-                             })
-      .def_property_readonly("boundary", [](const S& s) {
-        std::vector<std::string> names;
-        for (const Boundary each : s.box().boundary) names.emplace_back(find_boundary(each).name);
-        return names;
-      });
+      .def("tables",
+           [](const S& s, const std::string& which) {
+             py::list all;
+             for (const ValueTable& table : s.tables(which)) all.append(values_of(table.values));
+             return all;
+           })
+      .def("deck",
+           [](S& s, const std::string& of, const std::vector<std::string>& without) {
+             DeckValues values = s.deck(of);
+             for (const std::string& table : without) values.list(table).clear();
+             return write_deck(values);
+           })
+      .def_property_readonly("wall_loads", &S::wall_loads);
 }
 
-/// A session, its warnings, the title and the description.
+/// A session, its warnings, and the keys of [output] that the deck gives, with its directory.
 py::tuple opened(Deck& deck, auto&&... from) {
   py::object session;
+  const ValueTable& table = *deck.source->values.find("output");
+  Parameters output{{"directory", deck.output.directory.string()}};
+  for (const auto& [key, value] : table.values.all())
+    if (table.given(key) && key != "directory") output.set(key, value);
   if (deck.dimension == 2)
     session = py::cast(std::make_unique<Session<2>>(deck, from...));
   else
     session = py::cast(std::make_unique<Session<3>>(deck, from...));
-  return py::make_tuple(session, deck.warnings, deck.title, deck.description);
+  return py::make_tuple(session, deck.warnings, values_of(output));
 }
 
 /// The simulation of a deck, given as a file or as text.
@@ -375,15 +306,15 @@ py::dict descriptors() {
   }
   py::dict all;
   all["integrators"] = methods, all["forces"] = terms, all["boundaries"] = rules;
-  const auto table = [](const char* name, const std::vector<Parameter>& parameters) {
+  const auto table = [](const char* name) {
     py::dict one;
     one["name"] = name, one["meaning"] = table_schema(name).meaning;
-    one["parameters"] = described(parameters);
+    one["parameters"] = described(table_schema(name).keys);
     return py::make_tuple(one);
   };
-  all["walls"] = table("wall", wall_parameters());
-  all["contacts"] = table("contact", contact_parameters());
-  all["baths"] = table("bath", bath_parameters());
+  all["walls"] = table("wall");
+  all["contacts"] = table("contact");
+  all["baths"] = table("bath");
   return all;
 }
 

@@ -5,12 +5,13 @@
 #include <chrono>
 #include <cmath>
 
+#include "engine/forces/add_interaction.h"
+#include "engine/laws/bath_options.h"
 #include "engine/laws/contact_options.h"
 #include "engine/laws/wall_options.h"
 #include "engine/run/measurement.h"
 #include "engine/run/state.h"
 #include "engine/setup/epoch.h"
-#include "io/deck/deck_source.h"
 
 namespace carom::python {
 namespace {
@@ -25,45 +26,49 @@ double value_of(std::span<const double> values, std::size_t i, double fallback) 
   return values.empty() ? fallback : values[values.size() == 1 ? 0 : i];
 }
 
-template <int D>
-Vec<D> vector_at(std::span<const double> values, std::size_t i) {
-  return Eigen::Map<const Vec<D>>(values.data() + i * D);
+template <class T>
+T row_of(std::span<const double> values, std::size_t i) {
+  return Eigen::Map<const T>(values.data() + i * T::SizeAtCompileTime);
 }
 
+/// Rows of finite numbers.
 template <class T>
-void need_finite(std::span<const T> rows, const char* what) {
-  for (std::size_t i = 0; i < rows.size(); ++i) {
+std::vector<T> rows_of(std::span<const double> values, std::size_t count, const std::string& what) {
+  std::vector<T> rows(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    rows[i] = row_of<T>(values, i);
     if (!rows[i].allFinite())
-      throw Error(Failure::initial_state, std::string(what) + ": those of particle " + std::to_string(i) +
-                                              " are not finite; give finite numbers");
+      throw Error(Failure::initial_state,
+                  what + ": those of particle " + std::to_string(i) + " are not finite; give finite numbers");
     for (const double each : rows[i])
       if (const std::string error = beyond_limits(each); !error.empty())
         throw Error(Failure::initial_state,
-                    std::string(what) + ": a number of particle " + std::to_string(i) + " " + error);
+                    std::string(what).append(": a number of particle " + std::to_string(i) + " ").append(error));
   }
+  return rows;
+}
+
+/// Replaces the distance within which bonds were found by these bonds.
+template <int D>
+void set_bonds(Parameters& table, const Interaction<D>& term) {
+  if (!table.has("within") || !term.bonds()) return;
+  table.erase("within");
+  table.set("pairs", *term.bonds());
 }
 
 }  // namespace
 
-/// Forwards the run's snapshots to the session.
 template <int D>
-class Session<D>::Shown : public Observer<D> {
- public:
-  Shown(Session& session, const RunHooks& hooks) : session_(session), hooks_(hooks) {}
-  void thermo(const Snapshot<D>& shot) override { session_.show(shot, hooks_); }
-
- private:
-  Session& session_;
-  const RunHooks& hooks_;
-};
-
-template <int D>
-Session<D>::Session(std::span<const double> edges, const std::vector<std::string>& boundary) {
-  for (int k = 0; k < D; ++k) box_.edges[k] = edges[k];
-  for (int k = 0; k < D; ++k) box_.boundary[k] = find_boundary(boundary[boundary.size() == 1 ? 0 : k]).boundary;
+Session<D>::Session(const std::vector<double>& edges, const std::vector<std::string>& boundary) {
+  std::ranges::copy(edges, box_.edges.begin());
+  for (int k = 0; k < D; ++k) box_.boundary[k] = find_boundary(boundary[k]).boundary;
   system_->species.clear();
   system_->box = box_;
   system_->check();
+  for (const TableSchema& table : deck_schema()) values_.tables[table.name];
+  set("", {{"format", std::int64_t{1}}});
+  set("system", {{"dimension", std::int64_t{D}}, {"boundary", boundary}});
+  if (!edges.empty()) values_.find("system")->values.set("box", edges);
   views_.rest(system_->particles);
 }
 
@@ -72,29 +77,21 @@ Session<D>::Session(Deck& deck, const std::optional<GivenState>& given, const Pa
   system_ = build_system<D>(deck, nullptr, given ? &*given : nullptr, pause);
   plan_ = deck.plan;
   box_ = system_->box;
-  for (const auto& wall : deck.source->walls) walls_.push_back(wall.parameters);
-  for (const auto& contact : deck.source->contacts) contacts_.push_back(contact.parameters);
-  for (const auto& bath : deck.source->baths) baths_.push_back(bath.parameters);
+  values_ = deck.source->values;
+  for (const char* const table : {"particles", "placement", "run", "output"}) values_.list(table).clear();
+  for (std::size_t n = 0; n < system_->interactions.size(); ++n)
+    set_bonds(values_.list("interaction")[n].values, *system_->interactions[n]);
   species_ = system_->species;
   size_ = system_->size();
-  integrator_ = &find_integrator(deck.integrator);
-  parameters_ = deck.integrator_parameters;
-  terms_ = Terms<D>(deck, *system_);
   text_ = deck.toml_text;
-  file_ = deck.file.string();
   warned_ = true;
-  const ValueTable& output = *deck.source->values.find("output");
-  for (const auto& [key, place] : output.places)
-    if (const auto value = output.values.all().find(key); value != output.values.all().end())
-      deck_output_.set(key, value->second);
-  deck_output_.set("directory", deck.output.directory.string());
   views_.rest(system_->particles);
 }
 
 /// To be called before any change.
 template <int D>
-void Session<D>::change(const char* what) {
-  if (running_) refuse("a run is going on; " + std::string(what) + " before it or after it");
+void Session<D>::change(const std::string& what) {
+  if (running_) refuse("a run is going on; " + what + " before it or after it");
   state_.clear();
   failure_.clear();
   shot_.reset();
@@ -120,7 +117,7 @@ void Session<D>::add_particles(const Columns& columns) {
   const auto kind = static_cast<std::uint16_t>(at - species_.begin());
   if (kind == kinds) {
     species_.push_back(columns.species);
-    if (!contacts_.empty()) set_contacts(contacts_);
+    if (!values_.list("contact").empty()) set_contacts(values_.list("contact"));
   }
   system_->species = species_;
   views_.detach(all);
@@ -136,15 +133,14 @@ void Session<D>::add_particles(const Columns& columns) {
     const Particle<D> fallback{.x = Vec<D>::Zero()};
     for (std::size_t i = 0; i < added; ++i) {
       const std::size_t id = before + i;
-      all.x[id] = vector_at<D>(columns.x, i);
-      all.v[id] = columns.v.empty() ? fallback.v : vector_at<D>(columns.v, i);
+      all.x[id] = row_of<Vec<D>>(columns.x, i);
+      all.v[id] = columns.v.empty() ? fallback.v : row_of<Vec<D>>(columns.v, i);
       all.image[id] = {};
       all.mass[id] = value_of(columns.mass, i, fallback.mass);
       all.radius[id] = value_of(columns.radius, i, fallback.radius);
       all.charge[id] = value_of(columns.charge, i, fallback.charge);
       all.species[id] = kind;
-      if (!columns.spin.empty())
-        all.spin[id] = Eigen::Map<const Spin<D>>(columns.spin.data() + i * Spin<D>::SizeAtCompileTime);
+      if (!columns.spin.empty()) all.spin[id] = row_of<Spin<D>>(columns.spin, i);
     }
     system_->check();
     for (const auto& [what, numbers] : {std::pair{"position", columns.x},
@@ -156,7 +152,7 @@ void Session<D>::add_particles(const Columns& columns) {
           throw Error(Failure::initial_state, std::string("add_particles: a number in '") + what + "' " + error);
     if (columns.inertia != 0) set_inertia(columns.species, columns.inertia);
     system_->wrap(Failure::initial_state);
-    terms_.make(*system_);
+    make_terms(*system_);
   } catch (...) {
     resize(before);
     species_.resize(kinds);
@@ -181,9 +177,7 @@ void Session<D>::set_velocity(std::span<const double> v) {
       refuse(
           "velocities: an epoch of free flight is going on; choose epochs that end where the callback comes: "
           "integrator(\"free-flight\", step=every)");
-    pushed_.resize(size_);
-    for (std::size_t i = 0; i < size_; ++i) pushed_[i] = vector_at<D>(v, i);
-    need_finite<Vec<D>>(pushed_, "velocities");
+    pushed_ = rows_of<Vec<D>>(v, size_, "velocities");
     return;
   }
   set(&Particles<D>::v, v, "velocities");
@@ -208,69 +202,112 @@ void Session<D>::set_inertia(const std::string& species, double inertia) {
 
 template <int D>
 template <class T>
-void Session<D>::set(std::vector<T> Particles<D>::*member, std::span<const double> values, const char* what) {
-  change(("set " + std::string(what)).c_str());
-  constexpr std::size_t kEach = T::SizeAtCompileTime;
-  std::vector<T> rows(size_);
-  for (std::size_t i = 0; i < size_; ++i) rows[i] = Eigen::Map<const T>(values.data() + i * kEach);
-  need_finite<T>(rows, what);
-  std::ranges::copy(rows, (system_->particles.*member).begin());
+void Session<D>::set(std::vector<T> Particles<D>::*member, std::span<const double> values, const std::string& what) {
+  change("set " + what);
+  std::ranges::copy(rows_of<T>(values, size_, what), (system_->particles.*member).begin());
 }
 
 template <int D>
-std::vector<Parameters> Session<D>::walls() const {
-  std::vector<Parameters> all = walls_;
-  for (std::size_t k = 0; k < all.size(); ++k) {
+void Session<D>::take(Session& placed) {
+  System<D>& system = *placed.system_;
+  make_terms(system);  // if this throws, nothing has changed
+  change("place particles");
+  warned_ = false;
+  const Box<D> before = std::exchange(box_, placed.box_);
+  box_.contacts.inertias = before.contacts.inertias;
+  box_.bath = before.bath;
+  system.box = box_;
+  views_.detach(system_->particles);
+  system.particles.spin = std::move(system_->particles.spin);
+  if (!system.particles.spin.empty()) system.particles.spin.resize(placed.size_, Spin<D>::Zero());
+  system_ = std::move(placed.system_);
+  views_.rest(system_->particles);
+  species_ = placed.species_;
+  size_ = placed.size_;
+  values_.list("system") = placed.values_.list("system");
+}
+
+template <int D>
+const IntegratorInfo* Session<D>::integrator() const {
+  const ValueTable* table = values_.find("integrator");
+  return table ? &find_integrator(table->variant->name) : nullptr;
+}
+
+template <int D>
+std::vector<ValueTable> Session<D>::tables(const std::string& name) const {
+  std::vector<ValueTable> all = values_.list(name);
+  for (std::size_t k = 0; name == "wall" && k < all.size(); ++k) {
     WallOptions<D> now = box_.options[k];
     now.restart(present());
-    all[k].set("moved", now.moved);
-    all[k].set("phase", now.turns);
+    all[k].values.set("moved", now.moved);
+    all[k].values.set("phase", now.turns);
   }
+  const Bath& bath = (at_work_ ? at_work_->box : box_).bath;
+  if (name == "bath" && bath.has_ramp() && !bath.needs_ramp_time())
+    all[0].values.set("ramp_time", std::vector{bath.ramp_start, bath.ramp_end});
   return all;
 }
 
 template <int D>
-void Session<D>::add_wall(Parameters given) {
+void Session<D>::set(const std::string& name, Parameters given) {
+  if (name == "wall") return set_wall(std::move(given));
+  if (name == "contact") return add_contact(std::move(given));
+  if (name == "interaction") return add_force(std::move(given));
+  ValueTable table = table_of(name, std::move(given));
+  if (name == "bath") {
+    const Bath bath = bath_of(table.values);
+    change("set a bath");
+    system_->box.bath = box_.bath = bath;
+  } else if (name == "integrator") {
+    change("choose the integrator");
+    warned_ = false;
+  }
+  values_.list(name) = {std::move(table)};
+}
+
+template <int D>
+void Session<D>::set_wall(Parameters given) {
   if (running_) refuse("a run is going on; change walls before it or after it");
-  std::vector<Parameters> all = walls();
+  std::vector<ValueTable> all = tables("wall");
   const auto* name = given.find<std::string>("name");
   const auto old =
-      std::ranges::find_if(all, [&](const Parameters& each) { return name && each.text("name") == *name; });
+      std::ranges::find_if(all, [&](const ValueTable& each) { return name && each.values.text("name") == *name; });
   if (old == all.end()) {
-    all.push_back(completed("wall", wall_parameters(), std::move(given)));
+    all.push_back(table_of("wall", std::move(given)));
   } else {
     for (const char* const fixed : {"normal", "offset"})
       if (given.has(fixed))
         refuse("the wall '" + *name + "' is there already and stays where it is; leave '" + fixed +
                "' out, or give 'moved'");
     const bool stays = given.has("velocity") && !given.has("moved");
-    Parameters changed = *old;
+    Parameters changed = old->values;
     if (stays) changed.set("phase", 0.0), changed.set("moved", 0.0);
     for (const auto& [key, value] : given.all()) changed.set(key, value);
-    *old = completed("wall", wall_parameters(), std::move(changed));
+    *old = table_of("wall", std::move(changed));
     if (stays) {
       Box<D> box = box_;
       box.options.clear();
-      carom::add_wall(box, *old);
-      old->set("moved", box_.options[old - all.begin()].displacement(present()) - box.options[0].displacement(0));
+      add_wall(box, old->values);
+      old->values.set("moved",
+                      box_.options[old - all.begin()].displacement(present()) - box.options[0].displacement(0));
     }
   }
   Box<D> box = box_;
   box.restart();
   box.options.clear();
-  for (const Parameters& each : all) carom::add_wall(box, each);
+  for (const ValueTable& each : all) add_wall(box, each.values);
   change("add walls");
   warned_ = false;
   system_->box = box_ = box;
-  walls_ = std::move(all);
-  set_contacts(contacts_);
+  values_.list("wall") = std::move(all);
+  set_contacts(values_.list("contact"));
 }
 
 template <int D>
 void Session<D>::add_contact(Parameters given) {
   if (running_) refuse("a run is going on; change the laws of contacts before it or after it");
-  auto all = contacts_;
-  all.push_back(completed("contact", contact_parameters(), std::move(given)));
+  auto all = values_.list("contact");
+  all.push_back(table_of("contact", std::move(given)));
   const bool rough = box_.contacts.rough();
   need_state_at_end("a law of contacts");
   set_contacts(std::move(all));
@@ -289,35 +326,50 @@ void Session<D>::need_state_at_end(const char* what) const {
 
 /// Sets these laws for the present species and walls.
 template <int D>
-void Session<D>::set_contacts(std::vector<Parameters> all) {
+void Session<D>::set_contacts(std::vector<ValueTable> all) {
   Box<D> box = box_;
   box.contacts = {};
   box.contacts.inertias = box_.contacts.inertias;
-  for (const Parameters& each : all) carom::add_contact<D>(box, species_, each);
+  for (const ValueTable& each : all) carom::add_contact<D>(box, species_, each.values);
   system_->box = box_ = box;
-  contacts_ = std::move(all);
+  values_.list("contact") = std::move(all);
 }
 
 template <int D>
-void Session<D>::add_force(std::string_view type, Parameters given) {
-  const InteractionInfo& info = find_interaction(type);
-  if (info.name == "table")
+void Session<D>::add_force(Parameters given) {
+  if (given.text("type") == "table")
     if (const std::string wrong = read_points(given, {}, read_text); !wrong.empty()) refuse("table: " + wrong);
-  Parameters complete = completed(info.name, info.parameters, std::move(given));
-  if (size_ == 0) refuse(std::string(type) + ": there are no particles yet; call add_particles() first");
+  ValueTable table = table_of("interaction", std::move(given));
+  if (size_ == 0) refuse(table.variant->name + ": there are no particles yet; call add_particles() first");
   change("add forces");
   warned_ = false;
-  terms_.add(info, std::move(complete), *system_);
+  auto& all = values_.list("interaction");
+  all.push_back(std::move(table));
+  try {
+    make_terms(*system_);
+  } catch (...) {
+    all.pop_back();
+    throw;
+  }
 }
 
+/// Replaces the terms of V of a system, which has none if this throws. Bonds found in the first one are kept.
 template <int D>
-void Session<D>::set_integrator(std::string_view name, Parameters given) {
-  const IntegratorInfo& info = find_integrator(name);
-  Parameters complete = completed(info.name, info.parameters, std::move(given));
-  change("choose the integrator");
-  warned_ = false;
-  integrator_ = &info;
-  parameters_ = std::move(complete);
+void Session<D>::make_terms(System<D>& system) {
+  system.interactions.clear();
+  system.quanta = {};
+  try {
+    for (const bool bonded : {true, false})  // bonds first, since other terms may exclude bonded pairs
+      for (ValueTable& table : values_.list("interaction")) {
+        const InteractionInfo& info = find_interaction(table.variant->name);
+        if ((info.kind == InteractionInfo::Kind::bonded) != bonded) continue;
+        add_interaction(system, info, table.of_variant());
+        set_bonds(table.values, *system.interactions.back());
+      }
+  } catch (...) {
+    system.interactions.clear();
+    throw;
+  }
 }
 
 /// Whether the state that a run would continue from is at this end already.
@@ -343,7 +395,8 @@ Bytes Session<D>::saved(const std::string& name, double interval) const {
 template <int D>
 void Session<D>::run(Plan plan, const RunHooks& hooks) {
   if (running_) refuse("a run is going on; wait for its end");
-  if (integrator_ == nullptr) refuse("there is no integrator; call integrator(name, step=…) first");
+  const IntegratorInfo* const method = integrator();
+  if (method == nullptr) refuse("there is no integrator; call integrator(name, step=…) first");
   if (size_ == 0) refuse("there are no particles; call add_particles() first");
   if (!failure_.empty())
     refuse("the last run has failed (" + failure_ + "); give positions, velocities or an integrator to start anew");
@@ -351,31 +404,30 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
   if (begun && reached(plan))
     refuse("the run is at time " + short_text(statistics_.end_time) + ", step " + std::to_string(statistics_.steps) +
            " already; give a later end, or change something to start anew");
-  terms_.complete(*system_);
+  if (system_->interactions.empty()) make_terms(*system_);
   deck_warnings_.clear();
   warnings_.clear();
   if (output_)
     describe(plan, begun, hooks);
-  else if (!begun && text_.empty() && !std::exchange(warned_, true))
-    warn_of_start(hooks);
+  else if (!begun && !std::exchange(warned_, true))
+    warn_of_start();
   warnings_ = deck_warnings_;
-  Parameters parameters = parameters_;
-  if (!integrator_->stepping) choose_epoch(*system_, parameters, begun ? step_ : 0);
+  Parameters parameters = values_.find("integrator")->of_variant();
+  if (!method->stepping) choose_epoch(*system_, parameters, begun ? step_ : 0);
   step_ = parameters.real("step");
   const double interval = plan.thermo_interval;
 
   std::optional<Simulation<D>> made;  // if this throws, the session keeps its system
   if (begun) {
-    parameters = completed(integrator_->name, integrator_->parameters, std::move(parameters));
+    parameters = completed(method->name, method->parameters, std::move(parameters));
     plan.step = step_;
     if (parameters.has("longest_step")) plan.longest_step = parameters.real("longest_step");
-    made.emplace(std::move(system_), *integrator_, integrator_->make<D>(parameters), plan);
+    made.emplace(std::move(system_), *method, method->make<D>(parameters), plan);
   } else {
-    made.emplace(std::move(system_), *integrator_, std::move(parameters), plan);
+    made.emplace(std::move(system_), *method, std::move(parameters), plan);
   }
   Simulation<D>& run = *made;
-  Shown shown(*this, hooks);
-  std::optional<RunRecord<D>> record;
+  hooks_ = &hooks;
   at_work_ = &run.system();
   live_ = &run.statistics();
   views_.lend(at_work_->particles);
@@ -391,9 +443,9 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
     const bool stop = hooks.stop && hooks.stop(run.statistics());
     // After a velocity change at the very end, the state before the last, shortened step is useless.
     if (stop || run.is_last_on_the_way() || (pushed && run.statistics().fraction_done >= 1))
-      save(run, state, record ? &*record : nullptr);
-    else if (record && deck_->output.checkpoint_wall && since(last_checkpoint) >= *deck_->output.checkpoint_wall) {
-      record->checkpoint();
+      save(run, state);
+    else if (record_ && deck_->output.checkpoint_wall && since(last_checkpoint) >= *deck_->output.checkpoint_wall) {
+      record_->checkpoint();
       last_checkpoint = Clock::now();
     }
     return stop;
@@ -404,48 +456,40 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
       state_.clear();
       checkpoint_.reset();
     };
+  bool started = false;
   const auto end = [&] {
-    statistics_ = *std::exchange(live_, nullptr);
-    if (shot_ && std::abs(shot_->time - statistics_.end_time) <= 1e-9 * step_) shot_->time = statistics_.end_time;
-    shown_until_ = std::max(shown_until_, statistics_.end_time);
-    averages_ = averages();
-    record_ = nullptr;
+    warnings_ = deck_warnings_;
+    if (record_)
+      warnings_.insert(warnings_.end(), record_->warnings().begin(), record_->warnings().end());
+    else if (const auto overlap = overlap_warning(*live_, box_))
+      warnings_.push_back(*overlap);
+    if (started) {
+      statistics_ = *live_;
+      if (shot_ && std::abs(shot_->time - statistics_.end_time) <= 1e-9 * step_) shot_->time = statistics_.end_time;
+      shown_until_ = std::max(shown_until_, statistics_.end_time);
+      averages_ = averages();
+    }
+    live_ = nullptr;
+    record_.reset();
     pushed_.clear();
     rest(at_work_->particles);
   };
-  bool started = false;
   try {
-    if (deck_) record_ = &record.emplace(*deck_, run, begun ? &head_ : nullptr);
-    run.add(shown);
+    if (deck_)
+      record_.emplace(*deck_, run, RecordOptions{.from = begun ? &head_ : nullptr, .continued = begun, .silent = true});
+    run.add(*this);
     started = true;
     run.run(inner);
-    if (record) record->close();
+    if (record_) record_->close();
   } catch (const std::exception& e) {
-    if (record) record->fail(e.what());
-    warn(record ? &*record : nullptr);
-    if (!started) {
-      record_ = nullptr, live_ = nullptr;
-      rest(at_work_->particles);
-      throw;
-    }
-    failure_ = e.what();
+    if (record_) record_->fail(e.what());
+    if (started) failure_ = e.what();
     end();
     throw;
   }
   end();
-  warn(record ? &*record : nullptr);
   state_ = std::move(state);
   interval_ = interval;
-}
-
-/// Keeps the warnings of a run with or without files.
-template <int D>
-void Session<D>::warn(const RunRecord<D>* record) {
-  warnings_ = deck_warnings_;
-  if (record)
-    warnings_.insert(warnings_.end(), record->warnings().begin(), record->warnings().end());
-  else if (const auto overlap = overlap_warning(live_ ? *live_ : statistics_, box_))
-    warnings_.push_back(*overlap);
 }
 
 /// The system between runs.
@@ -463,13 +507,13 @@ void Session<D>::rest(Particles<D>& particles) {
 }
 
 template <int D>
-void Session<D>::show(const Snapshot<D>& shot, const RunHooks& hooks) {
+void Session<D>::thermo(const Snapshot<D>& shot) {
   shot_ = shot;
   shot_->particles = nullptr;
   at_step_end_ = shot.particles == &at_work_->particles;
   views_.show(*shot.particles);
   showing_ = true;
-  if (hooks.show && shot.time > shown_until_) hooks.show();
+  if (hooks_->show && shot.time > shown_until_) hooks_->show();
   showing_ = false;
   views_.hide();
 }
@@ -478,7 +522,7 @@ template <int D>
 const Snapshot<D>& Session<D>::shot() {
   if (shot_) return *shot_;
   if (running_) refuse("a run is just beginning; look at it in its callback, or after it");
-  terms_.complete(*system_);
+  if (system_->interactions.empty()) make_terms(*system_);
   System<D>& system = *system_;
   system.count_moving();
   system.quanta = quanta(system);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // A simulation that is built, run, inspected and continued step by step: the Python module's simulation, without
-// Python.
+// Python. It holds the tables of a deck, which are set one by one, and the particles as a state.
 //
 // Between runs the session has a system at rest; Simulation::run() advances it to an end, and saves the state from
 // which a later run() continues bit for bit like one undisturbed run (engine/run/state.h). A change of particles,
@@ -17,9 +17,8 @@
 
 #include "engine/run/simulation.h"
 #include "io/command/resume.h"
-#include "io/deck/deck.h"
+#include "io/deck/deck_source.h"
 #include "io/files/run_record.h"
-#include "io/python/terms.h"
 #include "io/python/views.h"
 
 namespace carom::python {
@@ -36,18 +35,18 @@ struct Columns {
 struct RunHooks {
   std::function<bool(const Statistics&)> stop;  ///< before each step; true: the run ends there
   std::function<void()> show;                   ///< at the intervals of the plan; the session then shows that time
-  std::function<std::string()> deck;  ///< the present state as a deck, without files only the counts of particles
-  std::string script;                 ///< the file of the program, which stands for a deck in the files
+  std::string script;                           ///< the file of the program, which stands for a deck in the files
 };
 
 /// The averages that a run computes, by name.
 using Averages = std::map<std::string, std::vector<TableColumn>>;
 
 template <int D>
-class Session {
+class Session : Observer<D> {
  public:
   /// All members throw Error.
-  Session(std::span<const double> edges, const std::vector<std::string>& boundary);
+  /// Without particles. No edges: take() will bring them.
+  Session(const std::vector<double>& edges, const std::vector<std::string>& boundary);
   /// The initial state of a deck, or a given state.
   explicit Session(Deck& deck, const std::optional<GivenState>& given = {}, const Pause& pause = {});
   /// The last checkpoint of a run that wrote files to a directory; the next run() continues the run and its files.
@@ -61,38 +60,24 @@ class Session {
   void set_spin(std::span<const double> spin);
   /// The reduced moment of inertia of a species.
   void set_inertia(const std::string& species, double inertia);
-  /// N velocities, drawn from the Maxwell–Boltzmann distribution for particles with a temperature (not NaN) [energy];
-  /// the present velocities for the rest.
-  std::vector<Vec<D>> drawn_velocities(std::span<const double> temperature, std::uint64_t seed);
-  /// The same for spins and rotational temperatures.
-  std::vector<Spin<D>> drawn_spins(std::span<const double> temperature, std::uint64_t seed);
-  /// Adds a wall or changes one, which stays where it is.
-  void add_wall(Parameters given);
-  /// Sets the bath, in place of an earlier one.
-  void set_bath(Parameters given);
-  /// Changes its temperature; the next run() goes on.
+  /// Draws velocities from the Maxwell–Boltzmann distribution, or spins, for the particles with a temperature (not NaN)
+  /// [energy]; the rest keep theirs.
+  void draw(std::span<const double> temperature, std::uint64_t seed, bool spins);
+  /// Sets a table of the deck: the title and the description; the bath or the integrator, in place of an earlier one; a
+  /// wall, added or changed, which then stays where it is; a further force; a further law of contacts between partners
+  /// that are there already, with which the next run() goes on.
+  void set(const std::string& table, Parameters given);
+  /// Changes the temperature of the bath; the next run() goes on.
   void set_bath_temperature(double temperature);
-  /// Sets the law of contacts between two partners, which must be there already; the next run() goes on.
-  void add_contact(Parameters given);
-  void add_force(std::string_view type, Parameters given);
-  void set_integrator(std::string_view name, Parameters given);
+  /// Takes over the particles and the box of a session, which must not be used then. Its first particles are those of
+  /// this session, and walls and contacts are the same.
+  void take(Session& placed);
   /// Makes later runs write files: `set` overrides [output] of a deck, including the directory; thermo rows and
   /// calls of RunHooks::show come at this interval.
   void set_output(std::vector<std::string> set, double thermo_interval);
 
-  /// Drops the settings of a deck for the run and its integrator, which must be set again.
-  void forget_run() {
-    plan_ = {};
-    integrator_ = nullptr;
-    parameters_ = {};
-    text_.clear();
-  }
-  /// Whether run() will call RunHooks::deck.
-  bool needs_deck() const { return text_.empty() && !begun(); }
   /// Whether the next run() continues one.
   bool begun() const { return shown_until_ >= 0; }
-  /// Whether runs write files.
-  bool writes_files() const { return output_.has_value(); }
   /// Runs to the end of the plan, counted in the time and steps of the whole run, so that a later end continues the
   /// run. The step of the plan is ignored.
   void run(Plan plan, const RunHooks& hooks);
@@ -100,64 +85,54 @@ class Session {
   // The present state: in RunHooks::show at the time shown, else at the end of the last run.
   const Snapshot<D>& shot();
   const Statistics& statistics() const { return live_ ? *live_ : statistics_; }
-  /// Views of all particles, valid during the life of the session.
-  std::span<const Vec<D>> position() { return views_.position(); }
-  std::span<const Vec<D>> velocity() { return views_.velocity(); }
-  std::span<const Image<D>> image() { return views_.image(); }
-  /// Empty if there never was a spin.
-  std::span<const Spin<D>> spin() { return views_.spin(); }
+  /// Valid during the life of the session.
+  ParticleViews<D>& views() { return views_; }
   /// By species; 0 or missing: homogeneous.
   const std::vector<double>& inertias() const { return box_.contacts.inertias; }
-  Constants constants() { return views_.constants(); }
-  const Box<D>& box() const { return box_; }
   const std::vector<std::string>& species() const { return species_; }
   std::size_t size() const { return size_; }
-  const IntegratorInfo* integrator() const { return integrator_; }
-  const Parameters& integrator_parameters() const { return parameters_; }
-  const std::vector<Force>& forces() const { return terms_.all(); }
-  /// With the places of moving walls, and the phases of shaken ones, at the time of the present state.
-  std::vector<Parameters> walls() const;
-  const std::vector<Parameters>& contacts() const { return contacts_; }
+  /// Null if there is none yet.
+  const IntegratorInfo* integrator() const;
+  /// The tables of this name, with the places of moving walls, the phases of shaken ones and the times of a ramp that
+  /// has begun, at the time of the present state.
+  std::vector<ValueTable> tables(const std::string& name) const;
+  /// The present state as a deck, without the images and [run]; `of` is what needs it, for messages.
+  DeckValues deck(const std::string& of);
   /// By name: the pressure on each face of the box that is a wall, and the force on each further wall, since the last
   /// row.
   std::map<std::string, double> wall_loads();
-  /// None, or one. A ramp that has begun has its ramp_time.
-  std::vector<Parameters> baths() const;
   /// During a run: only in RunHooks::show.
   Averages averages() const;
   /// Warnings of the last run.
   const std::vector<std::string>& warnings() const { return warnings_; }
   /// The directory of the files; empty: no files.
   std::string directory() const { return deck_ ? deck_->output.directory.string() : std::string(); }
-  /// The keys of [output] that the deck gives, and its directory.
-  const Parameters& deck_output() const { return deck_output_; }
   /// The plan of the deck; without a deck it has no end.
   const Plan& plan() const { return plan_; }
 
  private:
-  class Shown;
-  void change(const char* what);
+  void change(const std::string& what);
   void need_state_at_end(const char* what) const;
   double present() const { return showing_ ? shot_->time : statistics().end_time; }
-  void set_contacts(std::vector<Parameters> all);
+  void set_wall(Parameters given);
+  void add_contact(Parameters given);
+  void add_force(Parameters given);
+  void set_contacts(std::vector<ValueTable> all);
+  void make_terms(System<D>& system);
   template <class T>
-  void set(std::vector<T> Particles<D>::*member, std::span<const double> values, const char* what);
+  void set(std::vector<T> Particles<D>::*member, std::span<const double> values, const std::string& what);
   bool reached(const Plan& plan) const;
   Bytes saved(const std::string& name, double interval) const;
   void rest(Particles<D>& particles);
-  void warn(const RunRecord<D>* record);
-  void warn_of_start(const RunHooks& hooks);
-  void show(const Snapshot<D>& shot, const RunHooks& hooks);
+  void warn_of_start();
+  void thermo(const Snapshot<D>& shot) override;
   void describe(Plan& plan, bool begun, const RunHooks& hooks);
   void push(const Simulation<D>& run);
-  void save(Simulation<D>& run, std::map<std::string, Bytes>& state, RunRecord<D>* record);
+  void save(Simulation<D>& run, std::map<std::string, Bytes>& state);
 
   Box<D> box_;
-  std::vector<Parameters> walls_, contacts_, baths_;
+  DeckValues values_;  // without particles, [placement], [run] and [output]; bonds that were found are pairs
   std::vector<std::string> species_;
-  Terms<D> terms_;
-  const IntegratorInfo* integrator_ = nullptr;
-  Parameters parameters_;
   Plan plan_;
 
   std::unique_ptr<System<D>> system_ = std::make_unique<System<D>>();  // at rest; null while running
@@ -176,20 +151,20 @@ class Session {
   double state_time_ = 0, interval_ = 0, step_ = 0;
   double shown_until_ = -1;
 
-  bool showing_ = false;        // RunHooks::show is running
-  bool at_step_end_ = false;    // RunHooks::show is called between two steps
-  std::vector<Vec<D>> pushed_;  // new velocities, set by a callback
+  const RunHooks* hooks_ = nullptr;  // of the active run
+  bool showing_ = false;             // RunHooks::show is running
+  bool at_step_end_ = false;         // RunHooks::show is called between two steps
+  std::vector<Vec<D>> pushed_;       // new velocities, set by a callback
 
   std::optional<std::vector<std::string>> output_;  // overrides of [output]; nullopt: no files
-  std::string text_, file_;                         // the deck that the particles came from, and its file
+  std::string text_;                                // the deck that the particles are of; empty: of none
   std::optional<Deck> deck_;                        // deck of the run that writes files
   CheckpointHead head_;                             // positions in its files at the state to continue from
   std::shared_ptr<Checkpoint> checkpoint_;          // holds that state until the first run
-  const RunRecord<D>* record_ = nullptr;            // record of the active run
+  std::optional<RunRecord<D>> record_;              // of the active run
   Averages averages_;
   std::vector<std::string> deck_warnings_, warnings_;  // of the start of a run; of a run
   bool warned_ = false;  // of this system; changes of velocities and spins are no reason to look again
-  Parameters deck_output_;
 };
 
 }  // namespace carom::python

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The files of a session's runs: their deck, their state, the averages.
 
-#include <sstream>
-#include <string_view>
+#include <regex>
 
-#include "engine/laws/bath_options.h"
 #include "engine/setup/placement.h"
-#include "io/deck/deck_source.h"
 #include "io/deck/validate_state.h"
 #include "io/python/session.h"
 
@@ -42,17 +39,6 @@ void set_ends(Deck& deck, const Plan& plan) {
   deck.toml_text = write_deck(deck.source->values);
 }
 
-/// Sets the tables of this name in a deck.
-void set_tables(Deck& deck, const std::string& name, const std::vector<Parameters>& all) {
-  auto& tables = deck.source->values.list(name);
-  tables.clear();
-  for (const Parameters& each : all) {
-    ValueTable& table = tables.emplace_back();
-    table.schema = &table_schema(name);
-    table.values = each;
-  }
-}
-
 /// Changes a value of a run's state by its name.
 template <class T>
 void change_value(const Fields& fields, const std::string& name, const std::function<void(T&)>& change) {
@@ -71,20 +57,18 @@ void change_value(const Fields& fields, const std::string& name, const std::func
   }
 }
 
-/// The lines of an error or a warning without their places, which are those of a deck that the session has written.
-std::string without_places(const std::string& text, std::string_view before) {
-  std::istringstream lines(text);
-  std::string all;
-  for (std::string line; std::getline(lines, line);) {
-    const std::size_t at = line.find(before);
-    all += (all.empty() ? "" : "\n") + (at == std::string::npos ? line : line.substr(at + before.size()));
-  }
-  return all;
+/// An error or warnings without their places, which are those of a deck that the session has written.
+std::string without_places(const std::string& text) {
+  static const std::regex places("(^|\n)[^\n]*?: (error|warning): ");
+  return std::regex_replace(text, places, "$1");
 }
 
-/// The deck that the session has written.
-Deck written_deck(const RunHooks& hooks, std::span<const std::string> set) {
-  return read_deck(hooks.script, set, [&](const std::filesystem::path&) { return std::optional(hooks.deck()); });
+/// Vectors as a value of a deck.
+template <class T>
+std::vector<std::vector<double>> rows_of(std::span<const T> all) {
+  std::vector<std::vector<double>> rows;
+  for (const T& each : all) rows.emplace_back(each.begin(), each.end());
+  return rows;
 }
 
 }  // namespace
@@ -93,7 +77,6 @@ template <int D>
 Session<D>::Session(Deck& deck, Resumed& from)
     : Session(deck, GivenState{from.reader(), from.head.bonds, from.head.time}) {
   text_.clear();
-  file_.clear();
   system_->quanta = {};
   Archive(from.checkpoint->read("statistics"))(statistics_);
   checkpoint_ = std::make_shared<Checkpoint>(std::move(*from.checkpoint));
@@ -104,6 +87,50 @@ Session<D>::Session(Deck& deck, Resumed& from)
   interval_ = deck.plan.thermo_interval;
   output_.emplace();
   deck_ = deck;
+}
+
+template <int D>
+DeckValues Session<D>::deck(const std::string& of) {
+  const auto x = views_.position(), v = views_.velocity();
+  const Constants all = views_.constants();
+  if (!std::ranges::is_sorted(all.species))
+    refuse(of +
+           ": the particles of a species do not follow one another, which a deck needs; add species after species");
+  DeckValues values = values_;
+  for (const char* const table : {"wall", "bath"}) values.list(table) = tables(table);
+  for (ValueTable& bath : values.list("bath"))
+    if (const auto* ramp = bath.find<std::vector<double>>("ramp_time"))
+      bath.values.set("ramp_time", std::vector{ramp->front() - present(), ramp->back() - present()});
+  for (std::size_t begin = 0, n = 0; begin < size_; begin += n) {
+    const std::uint16_t kind = all.species[begin];
+    n = static_cast<std::size_t>(std::ranges::upper_bound(all.species, kind) - all.species.begin()) - begin;
+    const auto column = [&](std::span<const double> each) {
+      return std::vector(each.begin() + begin, each.begin() + begin + n);
+    };
+    Parameters species{{"name", species_[kind]}, {"position", rows_of(x.subspan(begin, n))}};
+    const std::vector<double> mass = column(all.mass);
+    const auto fixed = std::ranges::count_if(mass, [](double each) { return std::isinf(each); });
+    if (fixed > 0 && fixed < std::ssize(mass))
+      refuse(of + ": some particles of the species '" + species_[kind] +
+             "' are fixed, and others move, which a deck "
+             "cannot say; give the fixed ones a species of their own");
+    if (fixed > 0) {
+      species.set("fixed", true);
+    } else {
+      species.set("mass", mass);
+      species.set("velocity", rows_of(v.subspan(begin, n)));
+    }
+    const bool points = integrator() && !integrator()->hard_cores;
+    species.set(points ? "display_radius" : "radius", column(all.radius));
+    species.set("charge", column(all.charge));
+    if (box_.contacts.rough()) {
+      if (system_) system_->particles.spin.resize(size_, Spin<D>::Zero());
+      species.set("spin", rows_of(views_.spin().subspan(begin, n)));
+      if (kind < inertias().size() && inertias()[kind] != 0) species.set("inertia", inertias()[kind]);
+    }
+    values.list("particles").push_back(table_of("particles", std::move(species)));
+  }
+  return values;
 }
 
 template <int D>
@@ -123,25 +150,28 @@ void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
       if (hooks.stop && hooks.stop(statistics_))
         throw Error(Failure::interrupted, "stopped while the particles were placed; no file was written");
     };
+    const bool own = text_.empty();
+    const std::filesystem::path file = own ? hooks.script : values_.file;
     try {
-      Deck deck = text_.empty() ? written_deck(hooks, *output_)
-                                : read_deck(file_, *output_, [&](const std::filesystem::path& path) {
-                                    return path == file_ ? std::optional(text_) : read_text(path);
-                                  });
+      const std::string text = own ? write_deck(this->deck("run")) : text_;
+      std::vector<std::string> set = *output_;
+      if (own) set.emplace_back("run.steps=1");  // until set_ends()
+      Deck deck = read_deck(file, set, [&](const std::filesystem::path& path) {
+        return path == file ? std::optional(text) : read_text(path);
+      });
       set_ends(deck, plan);
       build_system<D>(deck, nullptr, nullptr, placing);
-      if (text_.empty()) {
-        for (std::string& each : deck.warnings) each = "warning: " + without_places(each, ": warning: ");
+      if (own) {
+        for (std::string& each : deck.warnings) each = "warning: " + without_places(each);
         if (!std::exchange(warned_, true)) deck_warnings_ = deck.warnings;
       }
       deck_ = std::move(deck);
     } catch (const Error& error) {
-      if (!text_.empty()) throw;
-      throw Error(error.failure(), without_places(error.what(), ": error: "));
+      if (!own) throw;
+      throw Error(error.failure(), without_places(error.what()));
     }
   } else {
-    set_tables(*deck_, "contact", contacts_);  // laws and the bath may have changed since the last run
-    set_tables(*deck_, "bath", baths());
+    for (const char* const changed : {"contact", "bath"}) deck_->source->values.list(changed) = tables(changed);
     set_ends(*deck_, plan);
   }
   const Plan& of = deck_->plan;
@@ -152,31 +182,29 @@ void Session<D>::describe(Plan& plan, bool begun, const RunHooks& hooks) {
                       "; the callback is called with each row: leave 'every' out, or give output() that thermo_interval"
                 : ", but output() got no thermo_interval, so that thermo.csv has its first and its last row only; the "
                   "callback is called with each row: give output() that thermo_interval"));
-  plan.frame_interval = of.frame_interval;
-  plan.thermo_interval = of.thermo_interval;
-  plan.events = of.events;
-  plan.from_equilibrium = of.from_equilibrium;
+  plan = of;
+  plan.step = 0;  // that of the integrator
 }
 
 /// Finds the warnings that a deck of this simulation would get before its run, on a copy of the system. There are none
 /// if no deck can say what the simulation is: only a run with files must be a deck.
 template <int D>
-void Session<D>::warn_of_start(const RunHooks& hooks) {
-  Problems problems;
+void Session<D>::warn_of_start() {
+  Problems problems, of_deck;
   try {
-    const Deck deck = written_deck(hooks, {});
+    Deck deck;
+    interpret(values_, read_text, deck, of_deck);  // without the particles
     System<D> copy;
     copy.box = box_;
     copy.species = species_;
     copy.particles = system_->particles;
     copy.need_spins();
-    terms_.make(copy);
+    make_terms(copy);
     warn_of_state(deck, copy, problems);
   } catch (const Error&) {
     return;
   }
-  for (const std::string& each : problems.warnings())
-    deck_warnings_.push_back("warning: " + without_places(each, ": warning: "));
+  for (const std::string& each : problems.warnings()) deck_warnings_.push_back("warning: " + without_places(each));
 }
 
 /// Sets the velocities from a callback, between two steps. The added energy counts as work, like that of moving walls,
@@ -202,18 +230,17 @@ void Session<D>::push(const Simulation<D>& run) {
 
 /// Saves the state to continue from, in memory and with the files.
 template <int D>
-void Session<D>::save(Simulation<D>& run, std::map<std::string, Bytes>& state, RunRecord<D>* record) {
+void Session<D>::save(Simulation<D>& run, std::map<std::string, Bytes>& state) {
   state.clear();
   save_state(*at_work_, into(state));
   state_time_ = run.statistics().end_time;
   state_steps_ = run.statistics().steps;
-  if (record) head_ = record->checkpoint();
+  if (record_) head_ = record_->checkpoint();
 }
 
 template <int D>
 Averages Session<D>::averages() const {
-  if (running_ && record_ == nullptr) return {};
-  if (record_ == nullptr) return averages_;
+  if (!record_) return running_ ? Averages() : averages_;
   Averages all;
   record_->files().for_each_average(
       [&](const std::string& name, const Observable<D>& average) { all[name] = average.table(); });
@@ -221,63 +248,41 @@ Averages Session<D>::averages() const {
 }
 
 template <int D>
-void Session<D>::set_bath(Parameters given) {
-  Parameters complete = completed("bath", bath_parameters(), std::move(given));
-  const Bath bath = bath_of(complete);
-  change("set a bath");
-  system_->box.bath = box_.bath = bath;
-  baths_ = {std::move(complete)};
-}
-
-template <int D>
-std::vector<Parameters> Session<D>::baths() const {
-  std::vector<Parameters> all = baths_;
-  if (const Bath& bath = (at_work_ ? at_work_->box : box_).bath; bath.has_ramp() && !bath.needs_ramp_time())
-    all[0].set("ramp_time", std::vector{bath.ramp_start, bath.ramp_end});
-  return all;
-}
-
-template <int D>
 void Session<D>::set_bath_temperature(double temperature) {
-  if (baths_.empty()) refuse("there is no bath; call add_bath() first");
+  ValueTable* const table = values_.find("bath");
+  if (table == nullptr) refuse("there is no bath; call add_bath() first");
   if (running_ && !(showing_ && std::this_thread::get_id() == runner_))
     refuse("a run is going on; change the temperature of the bath in its callback, before it or after it");
   if (!running_) need_state_at_end("the temperature of the bath");
-  Parameters given = baths_[0];
+  Parameters given = table->values;
   given.set("temperature", temperature);
   given.erase("ramp_time");
-  baths_[0] = completed("bath", bath_parameters(), std::move(given));
+  *table = table_of("bath", std::move(given));
   box_.bath.set_temperature(temperature);
   (at_work_ ? at_work_->box : system_->box).bath.set_temperature(temperature);
 }
 
 template <int D>
-std::vector<Vec<D>> Session<D>::drawn_velocities(std::span<const double> temperature, std::uint64_t seed) {
-  const auto mass = views_.constants().mass;
-  Particles<D> p;
-  p.mass.assign(mass.begin(), mass.end());
-  const auto v = views_.velocity();
-  p.v.assign(v.begin(), v.end());
-  p.x.resize(p.v.size());
-  const auto [chosen, each] = heated(temperature);
-  draw_velocities<D>(p, chosen, each, seed);
-  return std::move(p.v);
-}
-
-template <int D>
-std::vector<Spin<D>> Session<D>::drawn_spins(std::span<const double> temperature, std::uint64_t seed) {
+void Session<D>::draw(std::span<const double> temperature, std::uint64_t seed, bool spins) {
   const Constants constants = views_.constants();
+  const auto v = views_.velocity();
+  const auto spin = views_.spin();
   Particles<D> p;
   p.mass.assign(constants.mass.begin(), constants.mass.end());
   p.radius.assign(constants.radius.begin(), constants.radius.end());
   p.species.assign(constants.species.begin(), constants.species.end());
-  const auto spin = views_.spin();
+  p.v.assign(v.begin(), v.end());
   p.spin.assign(spin.begin(), spin.end());
-  p.x.resize(p.mass.size());
-  p.spin.resize(p.mass.size(), Spin<D>::Zero());
+  p.x.resize(size_);
+  p.spin.resize(size_, Spin<D>::Zero());
   const auto [chosen, each] = heated(temperature);
-  draw_spins<D>(p, box_.contacts, chosen, each, seed);
-  return std::move(p.spin);
+  if (spins) {
+    draw_spins<D>(p, box_.contacts, chosen, each, seed);
+    set_spin({p.spin.data()->data(), size_ * Spin<D>::SizeAtCompileTime});
+  } else {
+    draw_velocities<D>(p, chosen, each, seed);
+    set_velocity({p.v.data()->data(), size_ * D});
+  }
 }
 
 template class Session<2>;

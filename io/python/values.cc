@@ -119,6 +119,13 @@ Parameters parameters_of(std::string_view of, std::span<const Parameter> declare
   return parameters;
 }
 
+Parameters parameters_of(const TableSchema& table, const py::dict& given) {
+  const Variant* variant = given.contains("type") ? table.variant(given["type"].cast<std::string>()) : nullptr;
+  std::vector<Parameter> keys = table.keys;
+  if (variant != nullptr) keys.insert(keys.end(), variant->keys.begin(), variant->keys.end());
+  return parameters_of(variant ? variant->name : table.name, keys, given);
+}
+
 py::dict values_of(const Parameters& parameters) {
   py::dict all;
   for (const auto& [name, value] : parameters.all())

@@ -5,7 +5,7 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
-#include "engine/base/parameters.h"
+#include "io/deck/schema.h"
 
 namespace carom::python {
 
@@ -14,6 +14,9 @@ namespace py = pybind11;
 /// Converts keyword arguments to the declared parameters; arguments that are None are left out. Throws
 /// Error(Failure::deck) for a value that no parameter can have; completed() checks types and ranges.
 Parameters parameters_of(std::string_view of, std::span<const Parameter> declared, const py::dict& given);
+
+/// The same for a table of a deck.
+Parameters parameters_of(const TableSchema& table, const py::dict& given);
 
 /// The parameters as a dictionary by name.
 py::dict values_of(const Parameters& parameters);

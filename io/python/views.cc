@@ -15,39 +15,6 @@ void ParticleViews<D>::each(auto&& action) {
 }
 
 template <int D>
-template <class T>
-std::span<const T> ParticleViews<D>::view(std::vector<T> Particles<D>::*of, Kept<T>& kept) {
-  const std::lock_guard lock(mutex_);
-  if (lent_ && kept.values.empty()) {
-    if (shown_ == nullptr)
-      throw Error(Failure::deck, "a run is going on; look at the particles in its callback, or after it");
-    kept.values = shown_->*of;
-  }
-  kept.viewed = true;
-  return lent_ ? kept.values : particles_->*of;
-}
-
-template <int D>
-std::span<const Vec<D>> ParticleViews<D>::position() {
-  return view(&Particles<D>::x, x_);
-}
-
-template <int D>
-std::span<const Vec<D>> ParticleViews<D>::velocity() {
-  return view(&Particles<D>::v, v_);
-}
-
-template <int D>
-std::span<const Image<D>> ParticleViews<D>::image() {
-  return view(&Particles<D>::image, image_);
-}
-
-template <int D>
-std::span<const Spin<D>> ParticleViews<D>::spin() {
-  return view(&Particles<D>::spin, spin_);
-}
-
-template <int D>
 Constants ParticleViews<D>::constants() {
   const std::lock_guard lock(mutex_);
   constants_viewed_ = true;

@@ -24,10 +24,10 @@ class ParticleViews {
  public:
   /// Views of all particles. During a run, an array that has not been viewed before is available only between show()
   /// and hide(); otherwise these functions throw Error.
-  std::span<const Vec<D>> position();
-  std::span<const Vec<D>> velocity();
-  std::span<const Image<D>> image();
-  std::span<const Spin<D>> spin();
+  std::span<const Vec<D>> position() { return view(&Particles<D>::x, x_); }
+  std::span<const Vec<D>> velocity() { return view(&Particles<D>::v, v_); }
+  std::span<const Image<D>> image() { return view(&Particles<D>::image, image_); }
+  std::span<const Spin<D>> spin() { return view(&Particles<D>::spin, spin_); }
   Constants constants();
 
   /// Views the particles in place, which no run changes from now on.
@@ -51,7 +51,16 @@ class ParticleViews {
     bool viewed = false;
   };
   template <class T>
-  std::span<const T> view(std::vector<T> Particles<D>::*of, Kept<T>& kept);
+  std::span<const T> view(std::vector<T> Particles<D>::*of, Kept<T>& kept) {
+    const std::lock_guard lock(mutex_);
+    if (lent_ && kept.values.empty()) {
+      if (shown_ == nullptr)
+        throw Error(Failure::deck, "a run is going on; look at the particles in its callback, or after it");
+      kept.values = shown_->*of;
+    }
+    kept.viewed = true;
+    return lent_ ? kept.values : particles_->*of;
+  }
   void each(auto&& action);
 
   Kept<Vec<D>> x_, v_;

@@ -59,6 +59,44 @@ def test_walls_contacts_baths_and_files_stay_when_particles_are_placed(tmp_path)
     assert sim.work > 0 and sim.dissipated > 0 and sim.heat != 0 and len(sim.open().frames) == 2
 
 
+def test_species_keep_their_inertia_and_views_what_they_showed_when_others_are_placed():
+    sim = carom.Simulation(box=[8, 8])
+    sim.add_particles([[2, 2]], radius=0.5, species="ring", inertia=0.9, spin=[1.5])
+    sim.add_particles(count=3, temperature=1.0, radius=0.5, inertia=0.6)
+    views = [sim.position, sim.velocity, sim.spin, sim.mass]
+    copies = [view.copy() for view in views]
+    sim.place("random")
+    np.full(100000, np.nan)
+    assert all(np.array_equal(view, copy) for view, copy in zip(views, copies))
+    assert sim.spin.tolist() == [1.5, 0, 0, 0] and sim.position[0].tolist() == [2, 2] and len(sim) == 4
+    sim.add_contact("*", "*", tangential=0.5)
+    sim.spin = [1.0, 0.0, 0.0, 2.0]
+    assert sim.rotational_energy == pytest.approx(0.5 * 0.5**2 * (0.9 * 1.0**2 + 0.6 * 2.0**2))
+
+
+def test_bonds_that_were_found_stay_where_particles_are_moved_and_added():
+    sim = carom.Simulation(box=[12, 6])
+    sim.add_particles([[2, 3], [4, 3]])
+    sim.add_force("harmonic-bond", within=2.5, stiffness=1.0, rest_length=2.0)
+    sim.position = [[2, 3], [5, 3]]
+    sim.add_particles([[7, 3]])
+    assert sim.potential == pytest.approx(0.5) and sim._session.forces[0][1]["pairs"] == [[0, 1]]
+
+
+def test_the_files_of_a_deck_have_this_deck_and_not_the_particles_that_it_placed(tmp_path):
+    sim = carom.Simulation.from_deck(
+        {"format": 1, "system": {"dimension": 2, "box": [12.0, 12.0], "boundary": ["periodic", "periodic"]},
+         "particles": [{"name": "disc", "count": 16, "temperature": 1.0, "radius": 0.5}], "placement": {"type": "square"},
+         "interaction": [{"type": "harmonic-bond", "within": 3.5, "stiffness": 1.0, "rest_length": 3.0}],
+         "integrator": {"type": "psa", "step": 0.01}, "run": {"steps": 1}})
+    for change, counted in ((lambda: None, True), (lambda: sim.thermalize(2.0), False)):
+        change()
+        sim.output(tmp_path / str(counted))
+        sim.run(steps=1)
+        text = (tmp_path / str(counted) / "deck.toml").read_text()
+        assert ("count = 16" in text, "[placement]" in text, "within = 3.5" in text, "position = " in text) == (counted,) * 3 + (not counted,)
+
+
 @pytest.mark.parametrize("call, message", [
     (lambda s: s.place("fcc"), "no particles were given by count"),
     (lambda s: s.add_particles(count=3), "needs a 'temperature'"),

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writes decks as text."""
+"""Decks as text."""
 
-import itertools
 import json
 import pathlib
 import sys
@@ -40,82 +39,19 @@ def _is_table(value):
     return isinstance(value, dict) or (isinstance(value, list) and bool(value) and isinstance(value[0], dict))
 
 
-def deck_of(sim, of, ends, whole=True):
-    """The deck of a simulation: its present state without the images, forces, integrator, and the end of a run. If it is not `whole`,
-    the number of particles replaces their positions and velocities."""
-    if not sim._session.method:
-        raise UsageError(f"{of}: there is no integrator; call integrator(name, step=…) first")
-    deck = {"format": 1, "title": sim.title, "description": sim.description, "system": system_of(sim),
-            "particles": species_of(sim, of) if whole else counts_of(sim)}
-    if not whole and len(sim):
-        deck["placement"] = {"type": "random"}
-    if sim._session.method == "verlet":
-        for species in deck["particles"]:
-            species["display_radius"] = species.pop("radius")
-    deck |= surroundings_of(sim)
-    if sim._session.forces:
-        deck["interaction"] = [{"type": name} | given for name, given in sim._session.forces]
-    deck["integrator"] = {"type": sim._session.method} | sim._session.method_parameters
-    deck["run"] = {name: end for name, end in ends.items() if end is not None}
-    return deck
-
-
-def system_of(sim):
-    return {"dimension": len(sim.box), "box": sim.box, "boundary": sim.boundary}
-
-
-def surroundings_of(sim):
-    """The tables [[wall]], [[bath]] and [[contact]] of a deck."""
-    baths = [one | {"ramp_time": [time - sim.time for time in one["ramp_time"]]} if "ramp_time" in one else one for one in sim._session.baths]
-    tables = {"wall": sim.walls, "bath": baths, "contact": sim.contacts}
-    return {name: given for name, given in tables.items() if given}
-
-
-def species_of(sim, of):
-    """The tables [[particles]] of a deck, one for each species."""
-    kinds = sim.species
-    if np.any(np.diff(kinds.astype(int)) < 0):
-        raise UsageError(f"{of}: the particles of a species do not follow one another, which a deck needs; add species "
-                         "after species")
-    columns = {name: getattr(sim, name) for name in ("position", "velocity", "radius", "mass", "charge")}
-    species = [{"name": name} | {key: values[kinds == kind] for key, values in columns.items()}
-               for kind, name in enumerate(sim.species_names)]
-    for one in species:
-        if np.isinf(one["mass"]).any():
-            if not np.isinf(one["mass"]).all():
-                raise UsageError(f"{of}: some particles of the species '{one['name']}' are fixed, and others move, which a deck "
-                                 "cannot say; give the fixed ones a species of their own")
-            del one["mass"], one["velocity"]
-            one["fixed"] = True
-    if not any("tangential" in contact for contact in sim.contacts):
-        return species
-    spins = sim.spin.reshape(len(sim), -1)
-    for kind, (one, inertia) in enumerate(itertools.zip_longest(species, sim._session.inertias, fillvalue=0)):
-        one["spin"] = spins[kinds == kind]
-        if inertia:
-            one["inertia"] = inertia
-    return species
-
-
-def counts_of(sim):
-    """The tables [[particles]] of a deck with counts in place of positions and velocities."""
-    numbers, fixed = np.bincount(sim.species, minlength=len(sim.species_names)), np.isinf(sim.mass)
-    radius = float(sim.radius.max(initial=0.5))
-    return [{"name": name, "count": int(count), "temperature": 0.0, "radius": radius, "fixed": bool(fixed[sim.species == kind].all())}
-            for kind, (name, count) in enumerate(zip(sim.species_names, numbers)) if count]
-
-
 def write_deck(sim, file, ends, every):
     """See Simulation.write_deck()."""
     if all(end is None for end in ends.values()):
         raise UsageError("write_deck: the deck has no end; give time, steps or collisions")
-    deck = deck_of(sim, "write_deck", ends)
+    if not sim._session.method:
+        raise UsageError("write_deck: there is no integrator; call integrator(name, step=…) first")
+    more = {"run": {name: end for name, end in ends.items() if end is not None}}
     output = sim._deck_output if sim._output is None else sim._output
-    deck["output"] = {key: output[key] for key in output if key not in ("directory", "overwrite")}  # another run has its own files
+    more["output"] = {key: output[key] for key in output if key not in ("directory", "overwrite")}  # another run has its own files
     if every is not None:
-        deck["output"] |= {"frame_interval": float(every), "thermo_interval": float(every)}
+        more["output"] |= {"frame_interval": float(every), "thermo_interval": float(every)}
     try:
-        pathlib.Path(file).write_text(toml_text(deck))
+        pathlib.Path(file).write_text(sim._session.deck("write_deck", []) + toml_text(more))
     except OSError as error:
         raise FileError(f"{file}: cannot write the deck: {error.strerror}; check the path") from error
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from carom import files, formats, notebook, page, potentials
 from carom.checks import name_of, numbers, one_or_each, refuse_masked, refuse_ranks
-from carom.decks import deck_of, script_name, overrides, species_of, surroundings_of, system_of, toml_text, toml_value, write_deck
+from carom.decks import overrides, script_name, toml_text, toml_value, write_deck
 from carom.errors import CaromWarning, UsageError
 from carom.progress import Progress
 
@@ -66,16 +66,15 @@ class Simulation:
         if not all(isinstance(rule, str) for rule in rules) or len(rules) not in (1, len(edges)):
             raise UsageError(f"Simulation: 'boundary' is {boundary!r}; give one name, or one for each of {len(edges)} axes")
         kind = _carom.Session2 if len(edges) == 2 else _carom.Session3
-        self._start(kind(list(edges), rules))
-        self._edges_known = box is not None
+        self._start(kind([] if box is None else list(edges), rules * (len(edges) // len(rules))))
 
-    def _start(self, session, title="", description=""):
+    def _start(self, session):
         refuse_ranks()
-        self._session, self.title, self.description, self.warnings = session, title, description, []
+        self._session, self.warnings = session, []
         self._cores = False  # a radius was given
         self._deck_output, self._output = {}, None  # keys of [output]: the deck's, and those of runs; None: runs write no files
         self._every = False  # whether run(every=…) may set the thermo_interval, which is then the deck's
-        self._edges_known, self._counted, self._spinning, self._inertias, self.bonds = True, [], [], {}, np.empty((0, 2), int)
+        self._counted, self._spinning, self._inertias, self.bonds = [], [], {}, np.empty((0, 2), int)
 
     def _warn(self, texts, level=3):
         self.warnings = list(texts)
@@ -92,9 +91,9 @@ class Simulation:
         self = cls.__new__(cls)
         refuse_masked("from_deck", set or {})
         text = toml_text(deck) if isinstance(deck, collections.abc.Mapping) else None
-        session, texts, title, description = _carom.from_deck("deck" if text else os.fspath(deck), overrides(set or {}), text)
-        self._start(session, title, description)
-        self._deck_output = session.deck_output
+        session, texts, output = _carom.from_deck("deck" if text else os.fspath(deck), overrides(set or {}), text)
+        self._start(session)
+        self._deck_output = output
         self._warn(texts)
         return self
 
@@ -110,8 +109,7 @@ class Simulation:
             sim.run(time=200)
         """
         self = cls.__new__(cls)
-        session, _, title, description = _carom.from_run(os.fspath(directory), take_over)
-        self._start(session, title, description)
+        self._start(_carom.from_run(os.fspath(directory), take_over)[0])
         return self
 
     @classmethod
@@ -154,7 +152,7 @@ class Simulation:
         for name, value in (("temperature", temperature), ("rotational_temperature", rotational_temperature)):
             if value is not None:
                 raise UsageError(f"add_particles: '{name}' goes with 'count'; call thermalize() after particles with positions")
-        if not self._edges_known:
+        if "box" not in self._table("system"):
             raise UsageError("add_particles: explicit positions need the 'box' of the simulation; give its edges")
         dimension = len(self.box)
         x = numbers("add_particles", "position", position)
@@ -225,42 +223,25 @@ class Simulation:
         """
         if not self._counted:
             raise UsageError("place: no particles were given by count; call add_particles(count=…, temperature=…) first")
-        old, spin = self._session, self._session.spin()
-        system = system_of(self)
-        if not self._edges_known:
-            del system["box"]
-        placed = species_of(self, "place") if old.size else []
-        for one in placed:
-            self._inertias[one["name"]] = one.pop("inertia", 0.0)
-            one.pop("spin", None)
-        deck = {"format": 1, "system": system, "particles": placed + self._counted,
-                "placement": {"type": name_of("place", type), "seed": seed} | parameters,
-                "integrator": {"type": "free-flight"}, "run": {"collisions": 1}} | surroundings_of(self)
-        if old.method == "verlet":
-            deck |= {"integrator": {"type": "verlet", "step": 1.0}, "run": {"steps": 1},
-                     "particles": [{"display_radius" if key == "radius" else key: one[key] for key in one} for one in deck["particles"]]}
-        deck.pop("bath", None)  # it has no part in the placement
+        session = self._session
+        points = session.method == "verlet"
+        more = {"particles": [{"display_radius" if points and key == "radius" else key: one[key] for key in one} for one in self._counted],
+                "placement": {"type": name_of("place", type), "seed": seed} | parameters, "run": {"steps": 1}}
         if packing_fraction is not None:
-            deck["placement"]["packing_fraction"] = packing_fraction
-        session, texts, *_ = _carom.from_deck("place", [], toml_text(deck))
-        session.forget_run()
+            more["placement"]["packing_fraction"] = packing_fraction
+        if not points:
+            more["integrator"] = {"type": "free-flight"}
+        others = session.deck("place", ["bath", "interaction"] + ["integrator"] * (not points))  # they have no part in the placement
+        placed, texts, _ = _carom.from_deck("place", [], others + toml_text(more))
+        first = len(self)
+        session.take(placed)
         for name, inertia in self._inertias.items():
             if inertia:
                 session.set_inertia(name, inertia)
-        if spin.any():
-            session.set_spin(np.concatenate([spin, np.zeros((session.size - len(spin),) + spin.shape[1:])]))
-        spinning = np.concatenate([np.full(old.size, np.nan)] + self._spinning)
+        spinning = np.concatenate([np.full(first, np.nan)] + self._spinning)
         if not np.isnan(spinning).all():
-            session.set_spin(session.drawn_spins(spinning, seed))
-        for name, given in old.forces:
-            session.add_force(name, given)
-        for given in old.baths:
-            session.set_bath(given)
-        if old.method:
-            session.set_integrator(old.method, old.method_parameters)
-        if self._output:
-            self._set_output(session, self._output)
-        self._session, self._edges_known, self._counted, self._spinning, self._inertias = session, True, [], [], {}
+            session.draw(spinning, seed, True)
+        self._counted, self._spinning, self._inertias = [], [], {}
         self._warn(texts)
         return range(len(self))
 
@@ -276,11 +257,11 @@ class Simulation:
         chosen = slice(None) if species is None else self.species == self.species_names.index(species)
         each[chosen] = temperature
         each[np.isinf(self.mass)] = np.nan
-        self._session.set_velocity(self._session.drawn_velocities(each, seed))
+        self._session.draw(each, seed, False)
         if rotational_temperature is not None:
             each[chosen] = rotational_temperature
             each[np.isinf(self.mass)] = np.nan
-            self._session.set_spin(self._session.drawn_spins(each, seed))
+            self._session.draw(each, seed, True)
 
     def add_wall(self, name, normal=None, **parameters):
         """Adds a wall, or changes a face of the box whose boundary is a wall: "x-", "x+", "y-", …
@@ -294,7 +275,7 @@ class Simulation:
             sim.add_wall("ramp", normal=[1, 2], offset=3.0)           # normal·x = offset
         """
         given = refuse_masked("add_wall", parameters | {"name": name_of("add_wall", name)})
-        self._session.add_wall(given if normal is None else given | {"normal": numbers("add_wall", "normal", normal)})
+        self._session.set("wall", given if normal is None else given | {"normal": numbers("add_wall", "normal", normal)})
 
     def add_contact(self, one, other, **parameters):
         """Sets the law of contacts between two species, or between a species and a wall ("x-", or its name). "*" stands for all species and all walls.
@@ -308,7 +289,7 @@ class Simulation:
             sim.add_contact("ice", "ice", restitution={"form": "power", "v0": 0.01, "exponent": 0.234})
         """
         given = refuse_masked("add_contact", dict(parameters))
-        self._session.add_contact(given | {"between": [name_of("add_contact", one), name_of("add_contact", other)]})
+        self._session.set("contact", given | {"between": [name_of("add_contact", one), name_of("add_contact", other)]})
 
     def add_bath(self, type, temperature, rate, seed=1, ramp_time=None):
         """Couples all particles to a heat bath, in place of an earlier one.
@@ -324,7 +305,7 @@ class Simulation:
             sim.bath_temperature = 2.0       # the next run() continues the run
         """
         given = {"type": type, "temperature": temperature, "rate": rate, "seed": seed, "ramp_time": ramp_time}
-        self._session.set_bath(refuse_masked("add_bath", given))
+        self._session.set("bath", refuse_masked("add_bath", given))
 
     def _set_bath_temperature(self, value):
         self._session.set_bath_temperature(value)
@@ -333,7 +314,7 @@ class Simulation:
         """Adds a term of V by its name in decks; see carom.describe(type). Add the particles and species that it names first."""
         if isinstance(parameters.get("file"), os.PathLike):
             parameters["file"] = os.fspath(parameters["file"])
-        self._session.add_force(name_of("add_force", type), refuse_masked(type, parameters))
+        self._session.set("interaction", {"type": name_of("add_force", type)} | refuse_masked(type, parameters))
 
     def add_potential(self, expression, start, cutoff, tolerance=1e-8, options=None, **constants):
         """Adds a pair potential given as an expression of r; returns the points of its table and their errors, a Sampled.
@@ -372,12 +353,12 @@ class Simulation:
             raise UsageError("output: there is no 'directory'; give one, since there is no deck that does")
         refuse_masked("output", output)
         output["directory"] = os.path.abspath(os.fspath(output["directory"]))
-        self._set_output(self._session, output)
+        self._set_output(output)
         self._every = thermo_interval is None and "thermo_interval" in output
 
-    def _set_output(self, session, output):
-        session.set_output([f"output.{key}={toml_value(value)}" for key, value in output.items()],
-                           float(output.get("thermo_interval", 0)))
+    def _set_output(self, output):
+        self._session.set_output([f"output.{key}={toml_value(value)}" for key, value in output.items()],
+                                 float(output.get("thermo_interval", 0)))
         self._output = output
 
     @property
@@ -414,7 +395,7 @@ class Simulation:
 
     def integrator(self, type, **parameters):
         """Chooses the integrator by its name in decks; see carom.describe(type)."""
-        self._session.set_integrator(name_of("integrator", type), refuse_masked(type, parameters))
+        self._session.set("integrator", {"type": name_of("integrator", type)} | refuse_masked(type, parameters))
 
     def run(self, time=None, steps=None, collisions=None, every=None, callback=None, progress=None):
         """Runs to a time, a number of steps or a number of pair collisions, all counted from the start of the run. A later call with a
@@ -443,10 +424,9 @@ class Simulation:
         if self._output and self._every and every is not None and not self._session.begun and every != self._session.interval:
             if not (isinstance(every, numbers_type.Real) and 0 < every < np.inf):
                 raise UsageError(f"run: 'every' is {every!r}; give a positive number")
-            self._set_output(self._session, self._output | {"thermo_interval": float(every)})
+            self._set_output(self._output | {"thermo_interval": float(every)})
         try:
-            self._session.run(ends, callback and (lambda: callback(self)), line,
-                              lambda whole: toml_text(deck_of(self, "run", {"steps": 1}, whole)), script_name() if self._output else "simulation.py")
+            self._session.run(ends, callback and (lambda: callback(self)), line, script_name())
         finally:
             if line:
                 line.close()
@@ -504,23 +484,30 @@ class Simulation:
     charge = property(lambda self: self._session.constant("charge"), doc="Charges, (N,) [charge]; a view.")
     species = property(lambda self: self._session.constant("species"), doc="Indices into species_names, (N,); a view.")
     species_names = property(lambda self: self._session.species, doc="The names of the species.")
-    box = property(lambda self: self._session.box, doc="Edges of the box [length].")
-    contacts = property(lambda self: self._session.contacts, doc="The laws of contacts, as dictionaries of their options.")
-    bath = property(lambda self: next(iter(self._session.baths), None),
+    box = property(lambda self: self._table("system").get("box", [1.0] * self._table("system")["dimension"]), doc="Edges of the box [length].")
+    contacts = property(lambda self: self._session.tables("contact"), doc="The laws of contacts, as dictionaries of their options.")
+    bath = property(lambda self: next(iter(self._session.tables("bath")), None),
                     doc="The heat bath, as a dictionary of its options; None: there is none.")
     bath_temperature = property(lambda self: self.bath and self.bath["temperature"], _set_bath_temperature,
                                 doc="The temperature of the bath [energy]. If it is set between two runs, the second one continues the first.")
-    walls = property(lambda self: self._session.walls,
+    walls = property(lambda self: self._session.tables("wall"),
                      doc="The walls that were added, as dictionaries of their options; `moved` and `phase` are those of the present time.")
     wall_loads = property(lambda self: self._session.wall_loads,
                           doc="By wall: the pressure on a face of the box [energy/length^D], the force on a further wall, since "
                               "the last row or callback; between runs those of the last one.")
-    boundary = property(lambda self: self._session.boundary, doc="The name of the boundary on each axis.")
+    boundary = property(lambda self: self._table("system")["boundary"], doc="The name of the boundary on each axis.")
+
+    title, description = (
+        property(lambda self, key=key: self._table("")[key], lambda self, text, key=key: self._session.set("", self._table("") | {key: text}),
+                 doc=f"The {key} in decks and files.") for key in ("title", "description"))
 
     energy_error = property(lambda self: self._session.energy_error,
                             doc="The largest change of H + dissipated - work - heat since the first step, over max(|H_1|, K_1 + sum |V|).")
     force_passes = property(lambda self: self._session.force_passes, doc="Number of force passes: evaluations of pairs / interacting pairs.")
     wall_seconds = property(lambda self: self._session.wall_seconds, doc="Duration of the run [s].")
+
+    def _table(self, name):
+        return self._session.tables(name)[0]
 
     def __len__(self):
         return self._session.size
@@ -531,7 +518,7 @@ class Simulation:
 
     def __repr__(self):
         session = self._session
-        return (f"<carom.Simulation: {session.size} particles in {len(session.box)} dimensions, forces: "
+        return (f"<carom.Simulation: {session.size} particles in {len(self.box)} dimensions, forces: "
                 f"{', '.join(name for name, _ in session.forces) or 'none'}, integrator: {session.method or 'none'}>")
 
     def _repr_html_(self):
