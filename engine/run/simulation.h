@@ -26,12 +26,12 @@ namespace carom {
 
 /// When a run ends and what observers get on the way. At least one end is given; the run stops at the first it reaches.
 struct Plan {
-  double step = 0;          ///< length of a slab [time], > 0
-  double longest_step = 0;  ///< up to which slabs lengthen as a gas with inelastic contacts cools [time]; 0: never
-  std::optional<std::int64_t> steps{};  ///< number of slabs
-  std::optional<double> end_time{};     ///< the last slab is shortened to end there
+  double step = 0;          ///< length of a step [time], > 0
+  double longest_step = 0;  ///< up to which steps lengthen as a gas with inelastic contacts cools [time]; 0: never
+  std::optional<std::int64_t> steps{};  ///< number of steps
+  std::optional<double> end_time{};     ///< the last step is shortened to end there
   std::optional<std::uint64_t>
-      collisions{};            ///< pair collisions; free flight stops exactly there, other methods at the slab's end
+      collisions{};  ///< pair collisions; free flight stops exactly there, other methods at the end of the step
   double frame_interval = 0;   ///< simulated time between frames; 0: first and last only
   double thermo_interval = 0;  ///< simulated time between thermo rows; 0: first and last only
   bool events = false;         ///< pass every contact to the observers
@@ -72,7 +72,7 @@ struct WallLoad {
 template <int D>
 struct Readings {
   double time = 0;
-  std::int64_t step = 0;              ///< slabs completed (free flight: epochs begun or completed)
+  std::int64_t step = 0;              ///< steps completed (in free flight a last epoch that has begun counts, too)
   std::uint64_t collisions = 0;       ///< pair collisions so far
   double kinetic = 0, potential = 0;  ///< [energy]; K with that of spins, V with its long-range corrections
   double shadow = std::numeric_limits<double>::quiet_NaN();  ///< S_h [energy]; NaN if the method has none
