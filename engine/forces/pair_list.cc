@@ -248,8 +248,7 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
     if (plain.size() < size + candidates) plain.resize(2 * (size + candidates));
     if (other_.size() < candidates) other_.resize(candidates);
     search.here = ranges[first].here();
-    const Vec<D> shift = box_.shift(image);
-    for (int k = 0; k < 3; ++k) search.own[k] = built_at_[k][row] + (k < D ? shift[k] : 0.0);
+    for (int k = 0; k < 3; ++k) search.own[k] = built_at_[k][row] + (k < D ? image[k] * box_.edges[k] : 0.0);
     PartnersFound found{plain.data() + size, other_.data()};
     for (; first < last; ++first) kernels_->find(search, ranges[first].begin, ranges[first].end, found);
     const auto remove = [&](auto&& condition) {

@@ -339,7 +339,7 @@ TEST(EventCore, GrowthPushesRestingSpheresApartAndOffTheWalls) {
   // Two discs at rest at a distance of 2, far from the walls: they touch at t = 1 and separate at twice the rate of σ =
   // 1 + t.
   auto pair = test::make_system<2>({10, 9}, W, {{4, 4.5}, {6, 4.5}}, {{0, 0}, {0, 0}});
-  EventCore<2> other(pair->box, pair->particles);
+  EventCore<2> other(pair->box);
   other.load(pair->particles, Vec<2>::Zero(), 1.2, 1.0);
   other.run(1.2, {.counters = counters});
   other.copy_at(1.2, p);

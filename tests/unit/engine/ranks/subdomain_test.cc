@@ -51,8 +51,8 @@ struct Divided {
     Counters unused;
     whole.run(kEnd, {.counters = unused});
     for (const auto& part : parts) {
-      part->core.run(kEnd, {.counters = unused, .trace = &part->paths.start()});
-      part->changed = part->paths.end();
+      part->core.run(kEnd, {.counters = unused, .trace = &part->paths.start_log()});
+      part->changed = part->paths.link_log();
     }
   }
   /// Sends the changed paths; returns their number.
@@ -172,7 +172,7 @@ TEST(Ownership, AFreshGhostMayCollideManyTimes) {
   ASSERT_NE(unknown, far.end());
   const Record<3> r = d.cores[1]->flights()[*unknown];
   ASSERT_TRUE(here.admit(r, 0));
-  for (std::size_t k = 0; k < 10 * flights.capacity(); ++k) EXPECT_TRUE(here.turn(here.slot_of(r.id)));
+  for (std::size_t k = 0; k < 10 * flights.capacity(); ++k) EXPECT_TRUE(here.note_event(here.slot_of(r.id)));
   here.sort_out(0, 0.01, [](std::size_t, const Record<3>&) {});  // it was too far to be a ghost
   EXPECT_EQ(here.slot_of(r.id), IdTable::kNowhere);
 }
@@ -257,7 +257,7 @@ TEST(WindowPaths, CutsAtAKeyAndFindsWhatDiffersFromTheCore) {
   EXPECT_GT(before, 5u);
   EXPECT_LT(before, all);
   std::vector<Slot> other;
-  for (const auto& [slot, record, spin] : paths.finish()) {
+  for (const auto& [slot, record, spin] : paths.take_changes()) {
     EXPECT_LE(record.t, kEnd / 2);
     if (d.parts[0]->ownership.owns(slot)) other.push_back(slot);
   }
