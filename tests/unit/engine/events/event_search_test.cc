@@ -102,6 +102,33 @@ void expect_nothing_missed(Searched<D>& s) {
   EXPECT_EQ(now, first);
 }
 
+/// When spheres have been wrapped, their regions move with them, so that lists need not be made again.
+TEST(EventSearch, RegionsFollowSpheresThatWereWrapped) {
+  auto spheres = random_system<3>(300, {9, 10, 11}, {P, P, P}, 0.4, 0.4, 5);
+  for (Vec<3>& v : spheres->particles.v) v *= 0.05;  // they stay in their regions
+  Searched<3> s(std::move(spheres), Vec<3>::Zero(), SearchOptions::Method::lists);
+  std::vector<Vec<3>> centre, shift;
+  const auto centre_of = [&](Slot i) {
+    return Vec<3>(s.queue[i].where.centre[0], s.queue[i].where.centre[1], s.queue[i].where.centre[2]);
+  };
+  for (Slot i = 0; i < s.flights.size(); ++i) {
+    centre.push_back(centre_of(i));
+    shift.push_back(s.system->box.shift({i % 2 == 0 ? 1 : -1, i % 3 == 0 ? 1 : 0, 0}));
+    Record<3> r = s.flights[i];
+    r.x += shift[i];
+    s.flights.set(i, r, {});
+  }
+  s.search.start(Searched<3>::kStart, 0.1);
+  int displaced = 0;
+  for (Slot i = 0; i < s.flights.size(); ++i) {
+    const double from_centre = (s.flights[i].x - shift[i] - centre[i]).norm();
+    if (from_centre > 0.02) continue;
+    EXPECT_LT((centre_of(i) - centre[i] - shift[i]).norm(), 1e-12) << i;
+    displaced += from_centre > 1e-3 ? 1 : 0;
+  }
+  EXPECT_GT(displaced, 5);
+}
+
 TEST(EventSearch, PlansTheContactsThatTryingEverythingFinds) {
   for (const auto method : kMethods) {
     Searched<2> flat(random_system<2>(40, {9, 9}, {P, P}, 0.2, 0.5, 1), Vec<2>::Zero(), method);

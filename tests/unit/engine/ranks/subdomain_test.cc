@@ -177,6 +177,33 @@ TEST(Ownership, AFreshGhostMayCollideManyTimes) {
   EXPECT_EQ(here.slot_of(r.id), IdTable::kNowhere);
 }
 
+/// A sphere that is at rest before and after a window may have been fast between two events in it.
+TEST(Ownership, ASphereWithSeveralEventsMayHaveMovedFar) {
+  std::unique_ptr<System<3>> at_rest = fluid();
+  at_rest->particles.v.assign(at_rest->size(), Vec<3>::Zero());
+  const Divided d(std::move(at_rest));
+  Parts& here = *d.parts[0];
+  std::vector<Id> moved, sent;
+  for (const Slot i : here.ownership.own()) {
+    if (here.ownership.is_seen(i)) continue;
+    for (const double way : {-0.9 * kDisplacement, 0.9 * kDisplacement}) {
+      Record<3> r = here.core.flights()[i];
+      r.x[0] += way;
+      if (!d.bisection.near(1, d.bisection.wrapped(r.x))) continue;
+      const std::array<EventCore<3>::Changed, 1> changed{{{i, r, {}}}};
+      here.core.put(changed, 0);
+      for (int event = 0; event < 2; ++event) EXPECT_TRUE(here.ownership.note_event(i));
+      moved.push_back(r.id);
+      break;
+    }
+  }
+  here.ownership.sort_out(0.01, 0.01, [&](std::size_t, const Record<3>& r) { sent.push_back(r.id); });
+  std::ranges::sort(moved);
+  std::ranges::sort(sent);
+  EXPECT_GT(moved.size(), 10u);
+  EXPECT_EQ(sent, moved);
+}
+
 TEST(Ownership, AGhostMeetsWhatIsAsNearAsBothCanCome) {
   for (const Vec<3>& g : {Vec<3>(0, 0, 0), Vec<3>(2, -3, 6)}) {
     const Divided d(fluid(), g);

@@ -21,6 +21,7 @@ struct Way {
   std::function<double()> window{};
   std::uint64_t limit = std::numeric_limits<std::uint64_t>::max();
   std::uint64_t contacts = std::numeric_limits<std::uint64_t>::max();  ///< of a slab
+  bool log = true;                                                     ///< contacts
 };
 
 template <int D>
@@ -60,9 +61,10 @@ Outcome<D> divided(const Case<D>& c, const Way& way, Counters* counted = nullptr
     std::vector<Contact<D>> contacts;
     for (int k = 0; k < c.slabs && counters.sphere_sphere < way.limit; ++k) {
       flight.take(p, c.g, c.slab);
-      const double reached = flight.run(
-          c.slab,
-          {.counters = counters, .contacts = &contacts, .collision_limit = way.limit, .contact_limit = way.contacts});
+      const double reached = flight.run(c.slab, {.counters = counters,
+                                                 .contacts = way.log ? &contacts : nullptr,
+                                                 .collision_limit = way.limit,
+                                                 .contact_limit = way.contacts});
       flight.give_back(reached, p);
       system.wrap();
       system.box.time += reached;
@@ -219,6 +221,28 @@ TEST(WindowedFlight, GhostsThatFindNoRoom) {
   ASSERT_GT(reference.contacts.size(), 1000u);
   WindowCounts counts;
   expect_same(reference, divided(c, {.subdomains = 2}, nullptr, &counts), "falling");
+  EXPECT_GT(counts.cut, 0u);
+}
+
+/// A disc between two fixed ones, a millionth apart, fills the log of its subdomain in the first window; the other
+/// subdomain has few events and must end the window there, too.
+TEST(WindowedFlight, ALogThatIsFullInOneSubdomain) {
+  std::vector<Vec<2>> x = {{2, 6}, {2.4 + 1e-6, 6}, {2.8 + 2e-6, 6}}, v = {{0, 0}, {1, 0}, {0, 0}};
+  for (int i = 0; i < 200; ++i) {
+    x.push_back({8.0 + i % 20, 0.5 + i / 20});
+    v.push_back({std::sin(7.0 * i), std::cos(11.0 * i)});
+  }
+  std::vector<double> mass(x.size(), 1.0);
+  mass[0] = mass[2] = std::numeric_limits<double>::infinity();
+  const Case<2> c{.system = test::make_system<2>({30, 12}, P, x, v, std::vector<double>(x.size(), 0.2), mass),
+                  .slab = 0.1};
+  const auto reference = whole(c);
+  ASSERT_GT(reference.contacts.size(), 40000u);
+  WindowCounts counts;
+  const auto parts = divided(c, {.subdomains = 2, .log = false}, nullptr, &counts);
+  EXPECT_EQ(parts.particles.x, reference.particles.x);
+  EXPECT_EQ(parts.particles.v, reference.particles.v);
+  EXPECT_EQ(counts.subdomains, 2u);
   EXPECT_GT(counts.cut, 0u);
 }
 
