@@ -75,7 +75,7 @@ struct Particles {
     }
     return static_cast<Id>(x.size() - 1);
   }
-  /// Calls visit(array, member of Internal) for each array of the internal state; arrays may be empty.
+  /// Calls visit(array, member of Internal) for each array of the internal state.
   template <class Visit>
   void for_each_internal(Visit&& visit) {
     visit(spin, &Internal<D>::spin);

@@ -79,10 +79,12 @@ template <int D>
                                                             double w = 0) {
   if (laws.elastic()) return {.factor = collision_factor<D>(d, v, a.mass, b.mass, sigma, w)};
   const double closing = -(d.dot(v) - sigma * w), square = closing * closing / d.squaredNorm();
-  const double e = laws.of_pair(a.species, b.species)
-                       .restitution_at(std::sqrt(square), laws.thermal_speed, laws.restitution_when_slow);
+  const double inverse_mass = 1 / a.mass + 1 / b.mass;
+  const double e =
+      laws.of_pair(a.species, b.species)
+          .restitution_at({std::sqrt(square), inverse_mass}, laws.thermal_speed, laws.restitution_when_slow);
   return {.factor = collision_factor<D>(d, v, a.mass, b.mass, sigma, w, e),
-          .dissipated = 0.5 * (1 - e * e) * square / (1 / a.mass + 1 / b.mass)};
+          .dissipated = 0.5 * (1 - e * e) * square / inverse_mass};
 }
 
 /// A contact of two spheres, which may change their internal states.
@@ -90,7 +92,7 @@ template <int D>
 PairImpulse<D> pair_impulse(const ContactLaws& laws, const Vec<D>& d, const Vec<D>& v, const Partner<D>& a,
                             const Partner<D>& b, double sigma = 0, double w = 0) {
   PairImpulse<D> impulse = normal_impulse<D>(laws, d, v, a, b, sigma, w);
-  if (!a.internal) return impulse;
+  if (!a.internal || !laws.rough()) return impulse;
   const TangentialImpulse<D> rubbed = rub_pair<D>(laws, d, v, impulse.factor, a, b);
   impulse.rough = true;
   impulse.rubbed = rubbed.impulse;
@@ -116,9 +118,10 @@ WallImpulse<D> wall_impulse(const ContactLaws& laws, const Wall<D>& wall, const 
     return {after, impulse, {.impulse = wall.along_normal(impulse), .work = work, .heat = gained - work}};
   }
   const double closing = rate - wall.opening(v, t);
-  const double e = laws.elastic() ? 1
-                                  : laws.of_wall(a.species, wall.number)
-                                        .restitution_at(closing, laws.thermal_speed, laws.restitution_when_slow);
+  const double e = laws.elastic()
+                       ? 1
+                       : laws.of_wall(a.species, wall.number)
+                             .restitution_at({closing, 1 / a.mass}, laws.thermal_speed, laws.restitution_when_slow);
   const Vec<D> after = wall.bounced(v, t, rate, e);
   const Vec<D> impulse = a.mass * (after - v);
   WallImpulse<D> bounced{after,
@@ -126,7 +129,7 @@ WallImpulse<D> wall_impulse(const ContactLaws& laws, const Wall<D>& wall, const 
                          {.impulse = wall.along_normal(impulse),
                           .work = wall.work(impulse, t),
                           .dissipated = 0.5 * (1 - e * e) * a.mass * closing * closing}};
-  if (!a.internal) return bounced;
+  if (!a.internal || !laws.rough()) return bounced;
   const TangentialImpulse<D> rubbed =
       rub_wall<D>(laws, wall.number, wall.normal, v, closing, bounced.exchange.impulse, a);
   bounced.v += rubbed.impulse / a.mass;

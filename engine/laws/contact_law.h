@@ -14,6 +14,12 @@
 
 namespace carom {
 
+/// What a law may depend on: the normal speed at which spheres, or a sphere and a wall, approach before the contact,
+/// and the inverse of their reduced mass, 1/m_a + 1/m_b.
+struct Approach {
+  double speed, inverse_mass;
+};
+
 /// A contact turns the normal speed v of approach into e·v and the tangential velocity s of the two surfaces into −β·s,
 /// unless that takes a tangential impulse of more than μ times the normal one (Walton, in: Particulate Two-Phase Flow
 /// (1993) 884).
@@ -25,7 +31,8 @@ struct ContactLaw {
   std::optional<double> tangential{};  ///< β: −1 smooth, 0 the surfaces stick, 1 their velocity is reversed; none: no
                                        ///< spins
   double friction = std::numeric_limits<double>::infinity();  ///< μ
-  double rest_speed = -1;  ///< see ContactLaws::slow [length/time]; negative: kRestFraction of the thermal speed
+  double rest_speed =
+      -1;  ///< see ContactLaws::restitution_when_slow [length/time]; negative: kRestFraction of the thermal speed
 
   /// Relative to the thermal speed: what slower approaches could lose is 1e-16 of the energy, the rounding of a sum.
   static constexpr double kRestFraction = 1e-8;
@@ -37,8 +44,9 @@ struct ContactLaw {
   /// Whether a contact with this normal speed of approach changes spins; slower ones are smooth.
   bool rubs(double speed, double thermal_speed) const { return rough() && speed >= slowest(thermal_speed); }
   double slowest(double thermal_speed) const { return rest_speed < 0 ? kRestFraction * thermal_speed : rest_speed; }
-  /// e for an approach at this speed; `when_slow`: below the rest speed.
-  double restitution_at(double speed, double thermal_speed, double when_slow) const {
+  /// e for an approach; `when_slow`: below the rest speed.
+  double restitution_at(const Approach& approach, double thermal_speed, double when_slow) const {
+    const double speed = approach.speed;
     if (!(speed >= slowest(thermal_speed))) return elastic() ? 1 : when_slow;
     return exponent == 0 ? restitution : std::min(1.0, elementary::pow(speed / v0, -exponent));
   }

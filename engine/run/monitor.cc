@@ -75,7 +75,7 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
   fields.add_value("sampled walls", sampled_walls_);
   fields.add_value("transient", transient_);
   fields.add_value("end of the transient", transient_end_);
-  static_assert(sizeof(Readings<D>) == (10 + D) * sizeof(double),
+  static_assert(sizeof(Readings<D>) == (10 + D) * sizeof(double) && alignof(Readings<D>) == sizeof(double),
                 "a checkpoint holds these bytes: no padding, or a new format");
   fields.add_value<Readings<D>>("last measurement", shot_);
   if (system.box.contacts.rough())
@@ -112,7 +112,7 @@ void Monitor<D>::start(const Integrator<D>& integrator, bool fresh) {
   shot_ = measure(time, system_.particles, &integrator, info_.shadow, fresh);
   statistics_.energy_initial = statistics_.energy_final = shot_.total();
   if (system_.box.contacts.rough()) statistics_.rotational_energy = shot_.rotational;
-  std::copy_n(shot_.momentum.begin(), D, account_.first_momentum.begin());
+  account_.first_momentum = shot_.momentum;
   count_from(shot_);
   statistics_.first_step_error = 0;
   sample(time, system_.particles);
@@ -298,8 +298,8 @@ void Monitor<D>::take(const Waiting& slab, const Sums& sums) {
         std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow + slab.tally.drained() - account_.first_shadow));
   guard(energy, magnitude);
   if (s.max_momentum_error)
-    s.max_momentum_error =
-        std::max(*s.max_momentum_error, (shot_.momentum - Vec<D>(account_.first_momentum.data())).norm());
+    s.max_momentum_error = std::max(*s.max_momentum_error,
+                                    (Vec<D>(shot_.momentum.data()) - Vec<D>(account_.first_momentum.data())).norm());
   note_overlap(slab, sums);
   account_.virial_time += slab.elapsed * account_.virial;
   const double path = slab.elapsed * 0.5 * (speed + account_.speed);

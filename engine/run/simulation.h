@@ -76,7 +76,7 @@ struct Readings {
   std::uint64_t collisions = 0;       ///< pair collisions so far
   double kinetic = 0, potential = 0;  ///< [energy]; K with that of spins, V with its long-range corrections
   double shadow = std::numeric_limits<double>::quiet_NaN();  ///< S_h [energy]; NaN if the method has none
-  Vec<D> momentum = Vec<D>::Zero();
+  std::array<double, D> momentum{};                          // no Vec, whose alignment would leave gaps
   double temperature = 0;  ///< Σ m v²/(D N) of the N particles that are not fixed, in units of energy (k_B = 1); total
                            ///< momentum is not subtracted
   double dissipated = 0, work = 0, heat = 0;  ///< sums of ContactTally so far [energy]

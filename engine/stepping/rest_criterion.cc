@@ -96,7 +96,10 @@ template <int D>
 double RestCriterion<D>::slowest_impact(const EventKey<D>& key, double closing) const {
   const ContactLaw& law = law_of(key);
   // Kicks sustain a bounce with the approach speed n kick/(1 + e) that takes n steps, as long as n ≤ 2e n/(1 + e) + 1.
-  const double kick = kick_ * std::max(0.0, closing), e = law.restitution_at(kick, 0, 0);
+  const double kick = kick_ * std::max(0.0, closing),
+               inverse_mass =
+                   1 / particles_.mass[key.lo] + (key.kind == EventKind::pair ? 1 / particles_.mass[key.hi] : 0.0);
+  const double e = law.restitution_at({kick, inverse_mass}, 0, 0);
   return law.slowest(box_.contacts.thermal_speed) + kick * std::min(1 / (1 - e), 1.0 * kMostBounces);
 }
 

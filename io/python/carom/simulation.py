@@ -281,8 +281,7 @@ class Simulation:
         """Sets the law of contacts between two species, or between a species and a wall ("x-", or its name). "*" stands for all species and all walls.
         Add species and walls first; a later law replaces an earlier one. Between two runs, the second one continues the first.
 
-        Parameters are those of [[contact]] in decks: restitution, tangential, friction, rest_speed; see
-        carom.describe("contact").
+        Parameters are those of [[contact]] in decks, which carom.describe("contact") lists.
 
             sim.add_contact("*", "*", restitution=0.9)
             sim.add_contact("*", "*", restitution=0.9, tangential=0.5, friction=0.3)     # rough spheres, which spin

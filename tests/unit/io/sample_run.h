@@ -68,7 +68,7 @@ Snapshot<D> sample_snapshot(const Particles<D>& particles, double time, std::int
   s.particles = &particles;
   s.kinetic = 2.5;
   s.potential = -1.25;
-  s.momentum = Vec<D>::Constant(0.5);
+  s.momentum.fill(0.5);
   s.temperature = 1.0 / 3;
   s.pressure = 0.1;
   return s;

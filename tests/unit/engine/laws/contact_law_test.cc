@@ -45,11 +45,11 @@ TEST(ContactLaws, ImpulseGivesBackAFractionOfTheNormalSpeed) {
 
 TEST(ContactLaws, PowerLawIsElasticForSlowApproaches) {
   const ContactLaw ice{.v0 = 0.01, .exponent = 0.234};
-  EXPECT_EQ(ice.restitution_at(0.005, 1, 0), 1);
-  EXPECT_NEAR(ice.restitution_at(0.1, 1, 0), std::pow(10, -0.234), 1e-15);
-  EXPECT_EQ((ContactLaw{.restitution = 0.5, .rest_speed = 1e-3}.restitution_at(9e-4, 1, 1)), 1);
-  EXPECT_EQ((ContactLaw{.restitution = 0.5}.restitution_at(2e-8, 1, 1)), 0.5);
-  EXPECT_EQ((ContactLaw{.restitution = 0.5}.restitution_at(0.5e-8, 1, 0)), 0);
+  EXPECT_EQ(ice.restitution_at({0.005, 1}, 1, 0), 1);
+  EXPECT_NEAR(ice.restitution_at({0.1, 1}, 1, 0), std::pow(10, -0.234), 1e-15);
+  EXPECT_EQ((ContactLaw{.restitution = 0.5, .rest_speed = 1e-3}.restitution_at({9e-4, 1}, 1, 1)), 1);
+  EXPECT_EQ((ContactLaw{.restitution = 0.5}.restitution_at({2e-8, 1}, 1, 1)), 0.5);
+  EXPECT_EQ((ContactLaw{.restitution = 0.5}.restitution_at({0.5e-8, 1}, 1, 0)), 0);
 }
 
 TEST(ContactLaws, MistakesAreErrorsWithARemedy) {

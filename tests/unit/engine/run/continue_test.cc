@@ -41,7 +41,7 @@ struct Account : Observer<D> {
   void note(const Snapshot<D>& s) {
     for (const double value : {s.time, s.kinetic, s.potential, s.shadow, s.pressure, s.max_energy_error, s.rotational})
       note(value);
-    note(static_cast<double>(s.step)), note(static_cast<double>(s.collisions)), note(s.momentum);
+    note(static_cast<double>(s.step)), note(static_cast<double>(s.collisions)), note(Vec<D>(s.momentum.data()));
   }
   void note(const Particles<D>& p) {
     for (Id i = 0; i < p.size(); ++i) {
