@@ -12,10 +12,11 @@
 
 namespace carom {
 
-/// The reach of a sphere, half the distance at which something can happen to a pair of equal spheres between events:
-/// nothing happens to two spheres whose distance is larger than the sum of their reaches. Searches, halos and windows
-/// use it and not the radius of the hard core, to which only contacts refer.
+/// The reach of a sphere: half the largest distance at which two such spheres can have an event. For two different
+/// spheres this distance is the sum of their reaches. The widths of lists, cells, halos and windows follow from the
+/// reach; the radius of the hard core is used only where a contact is computed.
 inline double reach_of(double radius) { return radius; }
+/// The reach for each of these radii.
 inline std::vector<double> reaches_of(std::vector<double> radii) {
   for (double& each : radii) each = reach_of(each);
   return radii;

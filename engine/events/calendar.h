@@ -113,8 +113,8 @@ class Calendar {
     CalendarEntry entry[kChunk];
   };
   struct Bin {
-    std::uint32_t chunk =
-        kNoChunk;  // the chunk that was added last; it may be full, and then append() adds another one
+    /// The chunk that was added last. It may be full, and then append() adds another one.
+    std::uint32_t chunk = kNoChunk;
     std::uint32_t count = 0;
   };
 

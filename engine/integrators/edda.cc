@@ -41,8 +41,8 @@ namespace {
 
 constexpr int kMostPieces = 1 << 17;    // of a step
 constexpr int kPiecesBeforeGrowth = 4;  // pieces that take few sweeps, before twice the length is tried
-constexpr int kFewSweeps =
-    SweepControl::kMostSweeps / 3;  // after pieces with at most this many, a piece of twice the length is tried
+// After pieces with at most this many sweeps, a piece of twice the length is tried.
+constexpr int kFewSweeps = SweepControl::kMostSweeps / 3;
 constexpr std::uint64_t kPartialUpdate = 5;  // if fewer than one particle in 5 moved, only its pairs are evaluated
 constexpr int kSwapsBeforeFreezing = 3;   // a particle is frozen at the next swap; swaps count once freezing may begin
 constexpr double kFrequencyMargin = 1.1;  // for frequencies above the estimate
@@ -83,8 +83,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     set_scales(system);
     const auto sum = [&](auto&& term) { return sum_over_all<D>(system, term); };
     const double mass = sum([&](Id i) { return p.mass[i]; });
-    const bool free =
-        system.size() > 1 && system.keeps_momentum();  // so that particles can move relative to the centre of mass
+    // Whether particles can move relative to a centre of mass with a constant velocity.
+    const bool free = system.size() > 1 && system.keeps_momentum();
     for (int k = 0; k < D; ++k)
       scales_.centre[k] = free ? sum([&](Id i) { return p.mass[i] * p.v[i][k]; }) / mass : 0.0;
   }
@@ -376,12 +376,12 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     const double missing = sums.missing.value(), most = kMostFolded * sums.kinetic.value();
     const bool folds_all = std::abs(missing + owed_) <= most, folds = folds_all || std::abs(missing) <= most;
     const double r = folds_all ? missing + owed_ : missing, share = r / sums.kinetic.value();
-    balance_ = {
-        .owed = folds_all ? 0
-                : folds   ? owed_
-                          : owed_ + missing,
-        .folded = folds ? std::abs(r) : 0,
-        .stretch = folds && r != 0 ? share / (1 + std::sqrt(1 + share)) : 0};  // √(1 + share) − 1 without cancellation
+    // The stretch is √(1 + share) − 1, computed without cancellation.
+    balance_ = {.owed = folds_all ? 0
+                        : folds   ? owed_
+                                  : owed_ + missing,
+                .folded = folds ? std::abs(r) : 0,
+                .stretch = folds && r != 0 ? share / (1 + std::sqrt(1 + share)) : 0};
     if (any_freezes_)
       balance_.frozen =
           static_cast<std::uint64_t>(sum_over_all<D>(system, [&](Id i) { return frozen(i) ? 1.0 : 0.0; }));

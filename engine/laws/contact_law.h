@@ -31,8 +31,8 @@ struct ContactLaw {
   std::optional<double> tangential{};  ///< β: −1 smooth, 0 the surfaces stick, 1 their velocity is reversed; none: no
                                        ///< spins
   double friction = std::numeric_limits<double>::infinity();  ///< μ
-  double rest_speed =
-      -1;  ///< see ContactLaws::restitution_when_slow [length/time]; negative: kRestFraction of the thermal speed
+  /// Below it ContactLaws::restitution_when_slow applies [length/time]; negative: kRestFraction of the thermal speed.
+  double rest_speed = -1;
 
   /// Relative to the thermal speed: what slower approaches could lose is 1e-16 of the energy, the rounding of a sum.
   static constexpr double kRestFraction = 1e-8;

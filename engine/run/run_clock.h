@@ -50,7 +50,7 @@ class RunClock {
   /// See Simulation::is_last_on_the_way().
   bool is_last_on_the_way(const Statistics& s) const;
 
-  /// Counts a slab whose particles are now at `reached`, a time since its start: sets the steps and the time in `s`.
+  /// Counts a slab that was advanced by `reached` [time]: sets the steps and the time in `s`.
   /// `pairs` and `walls` are its contacts, `boxes` its PastEpoch::boxes. Returns the length of the step or epoch if
   /// that is now complete, else 0.
   double end_slab(const Slab& slab, double reached, std::uint64_t pairs, std::uint64_t walls, double boxes,

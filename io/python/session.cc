@@ -42,8 +42,7 @@ std::vector<T> rows_of(std::span<const double> values, std::size_t count, const 
                   what + ": those of particle " + std::to_string(i) + " are not finite; give finite numbers");
     for (const double each : rows[i])
       if (const std::string error = beyond_limits(each); !error.empty())
-        throw Error(Failure::initial_state,
-                    std::string(what).append(": a number of particle " + std::to_string(i) + " ").append(error));
+        throw Error(Failure::initial_state, what + ": a number of particle " + std::to_string(i) + " " + error);
   }
   return rows;
 }

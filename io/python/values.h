@@ -15,7 +15,7 @@ namespace py = pybind11;
 /// Error(Failure::deck) for a value that no parameter can have; completed() checks types and ranges.
 Parameters parameters_of(std::string_view of, std::span<const Parameter> declared, const py::dict& given);
 
-/// The same for a table of a deck.
+/// Converts a table of a deck in this way, with the keys of the variant that its `type` names.
 Parameters parameters_of(const TableSchema& table, const py::dict& given);
 
 /// The parameters as a dictionary by name.

@@ -33,14 +33,14 @@ TEST(RestSlow, Heap) { expect_long_rest(test::heap(14)); }  // 1015 spheres
 
 /// An impact on bodies at rest, in a trap in the middle of the floor, which bends paths.
 template <int D>
-struct EventResult {
+struct Impact {
   Particle<D> striker;
   double end;         // shortly after the impact, before small differences grow
   double trap = 0.2;  // stiffness
 };
 
 template <int D, typename Scene>
-std::vector<Vec<D>> after_impact(Scene&& make, const EventResult<D>& impact, const char* method, double h) {
+std::vector<Vec<D>> after_impact(Scene&& make, const Impact<D>& impact, const char* method, double h) {
   auto scene = test::in_trap(make(), impact.trap);
   scene.system->particles.add(impact.striker);
   const auto run = test::run_until<D>(std::move(scene.system), method, h, impact.end);
@@ -53,7 +53,7 @@ std::vector<Vec<D>> after_impact(Scene&& make, const EventResult<D>& impact, con
 
 /// edda converges to the motion of cdda at small steps.
 template <int D, typename Scene>
-void expect_convergence(Scene&& make, const EventResult<D>& impact) {
+void expect_convergence(Scene&& make, const Impact<D>& impact) {
   const auto exact = after_impact<D>(make, impact, "cdda", 0.0005);
   std::vector<double> steps = {0.016, 0.008, 0.004, 0.002}, errors;
   for (const double h : steps) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 // Sources of pairs for the sum of a term of V: a list of bonds, all pairs, or the pairs within a cutoff.
-// PairSource lists what each source has. A source with lists, and one whose particles meet their own images, have more:
-// ListedPairs, PairsWithImages.
+// The concept PairSource states what every source must offer. ListedPairs adds what a source with a list of pairs
+// offers, PairsWithImages what a source offers if a particle can interact with its own images.
 
 #include <algorithm>
 #include <cmath>
@@ -55,7 +55,7 @@ concept ListedPairs = PairSource<S, D> &&
   changing.regroup();  // the particles have been replaced by others
 };
 
-/// A source whose particles may be partners of their own images.
+/// A source in which a particle can interact with its own images.
 template <class S, int D>
 concept PairsWithImages = PairSource<S, D> && requires(const S& source, void (*visit)(const Vec<D>&)) {
   source.for_each_own_image(visit);  // the separations of any particle from its own images within reach, one of ±d

@@ -284,7 +284,7 @@ TEST(WindowPaths, CutsAtAKeyAndFindsWhatDiffersFromTheCore) {
   EXPECT_GT(before, 5u);
   EXPECT_LT(before, all);
   std::vector<Slot> other;
-  for (const auto& [slot, record, spin] : paths.take_changes()) {
+  for (const auto& [slot, record, internal] : paths.take_changes()) {
     EXPECT_LE(record.t, kEnd / 2);
     if (d.parts[0]->ownership.owns(slot)) other.push_back(slot);
   }
