@@ -41,8 +41,9 @@ std::vector<T> rows_of(std::span<const double> values, std::size_t count, const 
       throw Error(Failure::initial_state,
                   what + ": those of particle " + std::to_string(i) + " are not finite; give finite numbers");
     for (const double each : rows[i])
-      if (const std::string error = beyond_limits(each); !error.empty())
-        throw Error(Failure::initial_state, what + ": a number of particle " + std::to_string(i) + " " + error);
+      if (std::string error = beyond_limits(each); !error.empty())
+        throw Error(Failure::initial_state,
+                    error.insert(0, what + ": a number of particle " + std::to_string(i) + " "));
   }
   return rows;
 }
