@@ -13,6 +13,7 @@
 // For touching pairs, an approach slower than `slack` (the rounding of velocities, see approach_slack) does not count:
 // no impulse could change it, so the contact would repeat without end.
 
+#include <algorithm>
 #include <cmath>
 
 #include "engine/base/vec.h"
@@ -67,6 +68,9 @@ double contact_time(const Vec<D>& d, const Vec<D>& v, double sigma, double w, do
   return b < 0 ? c / (root - b) : (b + root) / -outrun;  // the form of the root without cancellation
 }
 
+/// Far more than the rounding of the distance at which two spheres pass each other, relative to its terms.
+inline constexpr double kBendMargin = 1e-9;
+
 /// Parabolic relative motion d + v s + a s²/2, with s in [0, time_left). `touching` divides out the root s = 0 of a
 /// pair in contact. The time is 0 for a touching pair that approaches, and for one at rest that is pressed together.
 template <int D>
@@ -77,6 +81,11 @@ double contact_time(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double si
   if (!touching) {  // most pairs are too far apart: compare the distance with the path length
     const double path = time_left * (v.norm() + 0.5 * time_left * a.norm());
     if (c0 > 0 && path * (path + 2 * sigma) < c0) return kNever;
+    // Of the others, most pass each other: the parabola is never farther from the straight path than this bend.
+    const double bend = (0.5 + kBendMargin) * time_left * time_left * a.norm();
+    const double closest = b < 0 ? std::min(time_left, -b / v.squaredNorm()) : 0.0;
+    const double passing = (1 + kBendMargin) * sigma + bend;
+    if ((d + closest * v).squaredNorm() > passing * passing) return kNever;
   }
   const Polynomial<4> gap{{c0, 2 * b, v.squaredNorm() + d.dot(a), v.dot(a), 0.25 * a.squaredNorm()}};
   double s;

@@ -8,7 +8,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
+#include <utility>
 
 #include "engine/base/error.h"
 #include "engine/events/meeting.h"
@@ -16,6 +18,7 @@
 #include "engine/integrators/discrete_gradient.h"
 #include "engine/integrators/registry.h"
 #include "engine/stepping/contact_scan.h"
+#include "engine/stepping/local_error.h"
 
 namespace carom::integrator {
 namespace {
@@ -23,6 +26,8 @@ namespace {
 /// A step that does not converge in this many equal pieces ends the run. Halving a piece divides the contraction by
 /// four: forces may be 4¹⁴ = 3·10⁸ times too stiff for the step.
 constexpr int kMostPieces = 1 << 14;
+/// The velocity that the iteration of a piece leaves undetermined, relative to the largest (discrete_gradient.cc).
+constexpr double kRoundingOfPieces = 16 * std::numeric_limits<double>::epsilon();
 
 template <int D>
 class CollisionDiscreteDerivative : public Integrator<D> {
@@ -32,6 +37,12 @@ class CollisionDiscreteDerivative : public Integrator<D> {
         max_events_(static_cast<std::uint64_t>(parameters.integer("max_events_per_step"))) {}
 
   void start(System<D>& system, Counters&) override {
+    Counters uncounted;
+    last_a_.resize(system.size());
+    evaluate_forces<D>(system, system.particles.x, last_a_, uncounted);
+    for (std::size_t i = 0; i < last_a_.size(); ++i) last_a_[i] /= system.particles.mass[i];
+    system.fields.add("last acceleration", last_a_);
+    system.fields.add_value("last length", last_length_);
     scan_.emplace(system, max_events_, reactions_);
     scan_->rest().let_open();
     system.fields.add_value("reactions", reactions_);
@@ -64,6 +75,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
                           " pieces; the forces are not finite or far too stiff for step = " + short_text(slab.length));
         continue;
       }
+      judge(system, slab, tau, report);
       ended = tau == time_left;
       if (!ended && done + tau == done) scan_->count_event(violator_);  // limits the number of pieces of length zero
       std::ranges::copy(piece_->x(), p.x.begin());
@@ -78,6 +90,22 @@ class CollisionDiscreteDerivative : public Integrator<D> {
   }
 
  private:
+  /// Estimates the local error of the piece in piece_. Throws StepTooLong.
+  void judge(const System<D>& system, const Slab& slab, double tau, SlabReport<D>& report) {
+    const double noise =
+        kRoundingOfPieces * fastest(system.particles) * (1 / tau + (last_length_ > 0 ? 1 / last_length_ : 0));
+    const LocalError error = local_error<D>(system, piece_->a(), last_a_, tau, last_length_, noise);
+    if (error.rate > report.error.rate) report.error = error;
+    need_accuracy(error, slab.accuracy, tau, slab.length);
+    last_a_ = piece_->a();
+    last_length_ = tau;
+  }
+  static double fastest(const Particles<D>& p) {
+    double squared = 0;
+    for (const Vec<D>& v : p.v) squared = std::max(squared, v.squaredNorm());
+    return std::sqrt(squared);
+  }
+
   /// Leaves in piece_ the longest piece from p, at most `time_left`, that ends before or in the first contact; returns
   /// its length, or 0 if the solver does not converge.
   double find_piece(const Particles<D>& p, double time_left) {
@@ -138,6 +166,8 @@ class CollisionDiscreteDerivative : public Integrator<D> {
   std::optional<ContactScan<D>> scan_;
   std::optional<DiscreteGradient<D>> piece_;
   std::optional<ChordContacts<D>> contacts_;
+  std::vector<Vec<D>> last_a_;  // mean accelerations of the last piece, of this length; 0: those at the start
+  double last_length_ = 0;
   EventKey<D> violator_{};  // the contact that limits the last piece
   Counters* counters_ = nullptr;
   SlabWatch* watch_ = nullptr;
@@ -146,21 +176,22 @@ class CollisionDiscreteDerivative : public Integrator<D> {
 }  // namespace
 
 IntegratorInfo cdda() {
+  std::vector<Parameter> parameters = parameter::adaptive_steps();
+  parameters.push_back({.name = "order",
+                        .type = Parameter::Type::integer,
+                        .fallback = "2",
+                        .unit = "-",
+                        .meaning = "2: the plain discrete-gradient step; 4: composed of five (about five times the "
+                                   "cost; `accuracy` then chooses shorter steps than it must)",
+                        .range = Parameter::Range::positive,
+                        .choices = {"2", "4"}});
+  parameters.push_back(parameter::max_events_per_step());
   return {
       .name = "cdda",
       .title = "Collision Discrete Derivative Algorithm",
       .order = "2 or 4",
       .conserves = "energy and linear momentum to rounding, for any step",
-      .parameters = {parameter::step(),
-                     parameter::longest_step(),
-                     {.name = "order",
-                      .type = Parameter::Type::integer,
-                      .fallback = "2",
-                      .unit = "-",
-                      .meaning = "2: the plain discrete-gradient step; 4: composed of five (about five times the cost)",
-                      .range = Parameter::Range::positive,
-                      .choices = {"2", "4"}},
-                     parameter::max_events_per_step()},
+      .parameters = std::move(parameters),
       .documentation =
           "Discrete-gradient steps, cut for all particles at each collision so that every piece ends in contact. "
           "Each piece conserves the energy exactly, whatever its length. Each collision costs a few implicit solves of "
@@ -169,6 +200,7 @@ IntegratorInfo cdda() {
           "Enomoto, thesis, 2011; Gonzalez, J. Nonlinear Sci. 6 (1996) 449; LaBudde, Greenspan, Numer. Math. "
           "25 (1976) 323; Suzuki, Phys. Lett. A 146 (1990) 319",
       .exact = true,
+      .adapts = true,
       .in_2d = make<CollisionDiscreteDerivative, 2>,
       .in_3d = make<CollisionDiscreteDerivative, 3>};
 }

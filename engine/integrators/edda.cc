@@ -22,6 +22,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -34,6 +35,7 @@
 #include "engine/integrators/extrapolation.h"
 #include "engine/integrators/registry.h"
 #include "engine/integrators/sweep_control.h"
+#include "engine/stepping/local_error.h"
 #include "engine/stepping/slab_core.h"
 
 namespace carom::integrator {
@@ -47,7 +49,10 @@ constexpr std::uint64_t kPartialUpdate = 5;  // if fewer than one particle in 5 
 constexpr int kSwapsBeforeFreezing = 3;   // a particle is frozen at the next swap; swaps count once freezing may begin
 constexpr double kFrequencyMargin = 1.1;  // for frequencies above the estimate
 constexpr std::int64_t kStepsPerFrequency = 1000;  // steps for which the estimate is used
-constexpr double kMostFolded = 0.1;                // of the kinetic energy
+/// Of a sphere in a slab: the cost of a unit of time is least there, in the Yukawa fluid (README.md).
+const double kMostContacts = std::getenv("MC") ? std::atof(std::getenv("MC")) : 0.5;
+constexpr std::int64_t kStepsPerEstimate = 16;  // steps of fixed length for one estimate of the local error
+constexpr double kMostFolded = 0.1;             // of the kinetic energy
 // The rounding of positions changes the energy by this fraction of Σ |F| |x|, in any method.
 constexpr double kRoundingOfForces = 16 * std::numeric_limits<double>::epsilon();
 constexpr double kConverged = 0.5;              // of the tolerance: a particle with a smaller residual keeps its path
@@ -91,6 +96,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
+    report_ = &report;
     step_ = slab.index;
     if (!system.box.contacts.elastic()) set_scales(system);
     watch_ = report.watch;
@@ -141,6 +147,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       }
       const double time_left = slab.length - done, piece = std::min({longest, until_contact, time_left});
       if (solve(system, piece, looked)) {
+        judge(system, slab, piece);
         core_->commit(done);
         if (piece < time_left && watch_) watch_->before_change();
         finish(system, piece);
@@ -184,6 +191,17 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
                                             ", are not finite or far too stiff for step = " + short_text(slab.length) +
                                             "; use a smaller integrator.step");
     }
+  }
+
+  /// Estimates the local error of a piece that has been solved. Throws StepTooLong.
+  void judge(const System<D>& system, const Slab& slab, double piece) {
+    if (slab.accuracy == 0 && slab.index % kStepsPerEstimate != 0) return;
+    // A residual h |e| of at most tolerance_ · scale is left in both accelerations.
+    const double scale = std::max(scales_.speed, piece * scales_.strength), before = past_.last_length();
+    const double noise = tolerance_ * scale * (1 / piece + (before > 0 ? 1 / before : 0));
+    const LocalError error = local_error<D>(system, resting() ? smooth_ : mean_, past_.last(), piece, before, noise);
+    if (error.rate > report_->error.rate) report_->error = error;
+    need_accuracy(error, slab.accuracy, piece, slab.length);
   }
 
   /// Sweeps over a piece from the present state. If it returns true, core_ holds the flight on a_, mean_ the resulting
@@ -437,12 +455,23 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   std::int64_t step_ = 0;
   std::vector<Vec<D>> move_;  // change of a_ in the last sweep
   Counters* counters_ = nullptr;
+  SlabReport<D>* report_ = nullptr;
   SlabWatch* watch_ = nullptr;
 };
 
 }  // namespace
 
 IntegratorInfo edda() {
+  std::vector<Parameter> parameters = parameter::adaptive_steps();
+  parameters.push_back({.name = "tolerance",
+                        .type = Parameter::Type::real,
+                        .fallback = "1e-10",
+                        .unit = "-",
+                        .meaning = "largest residual of a step's impulses, as a velocity relative to the root mean "
+                                   "square velocity at the start; the energy stays exact: the missing energy is folded "
+                                   "into the velocities (energy.folded of summary.json); 0: rounding",
+                        .range = Parameter::Range::non_negative});
+  parameters.push_back(parameter::max_events_per_step());
   return {
       .name = "edda",
       .title = "Event-Driven Discrete gradients",
@@ -450,17 +479,7 @@ IntegratorInfo edda() {
       .conserves =
           "energy and linear momentum to rounding, for any step; angular momentum to the tolerance in slabs "
           "without collisions",
-      .parameters = {parameter::step(),
-                     parameter::longest_step(),
-                     {.name = "tolerance",
-                      .type = Parameter::Type::real,
-                      .fallback = "1e-10",
-                      .unit = "-",
-                      .meaning = "largest residual of a step's impulses, as a velocity relative to the root mean "
-                                 "square velocity at the start; the energy stays exact: the missing energy is folded "
-                                 "into the velocities (energy.folded of summary.json); 0: rounding",
-                      .range = Parameter::Range::non_negative},
-                     parameter::max_events_per_step()},
+      .parameters = std::move(parameters),
       .documentation =
           "Each particle moves under a constant acceleration of its own over the step, through all its collisions; the "
           "accelerations are the discrete gradient between the step's two ends. Sweeps find them; each sweep costs a "
@@ -470,6 +489,8 @@ IntegratorInfo edda() {
           "6 (1996) 449; Gonzalez, Schmidt, Ortiz, Int. J. Numer. Methods Eng. 84 (2010) 1085",
       .exact = true,
       .local = true,
+      .adapts = true,
+      .most_contacts = kMostContacts,
       .in_2d = make<EventDrivenDiscreteGradient, 2>,
       .in_3d = make<EventDrivenDiscreteGradient, 3>};
 }

@@ -57,6 +57,7 @@ class Extrapolation {
     }
   }
   const std::vector<Vec<D>>& last() const { return past_[0]; }
+  double last_length() const { return length_[0]; }  ///< 0: last() is of an instant
 
  private:
   /// Growth of the slab's length up to which all past slabs are used: the magnitudes of their weights, which multiply

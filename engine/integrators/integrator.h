@@ -24,6 +24,8 @@ struct Slab {
   double start = 0;        ///< simulated time at its start
   double length = 0;       ///< > 0
   std::int64_t steps = 1;  ///< in this length; more than one in epochs of free flight, and with longest_step
+  bool ends_step = true;   ///< false: a part of a step, which another slab goes on with
+  double accuracy = 0;     ///< Plan::accuracy
   /// Free flight stops at this many pair collisions (counted by Counters::sphere_sphere from the start of the run).
   std::uint64_t collision_limit = std::numeric_limits<std::uint64_t>::max();
   /// Free flight stops at this many contacts in the slab, those with walls and the kicks of a bath included.
@@ -39,6 +41,7 @@ struct SlabReport {
   std::function<void(double, const Particles<D>&)> observer{};  ///< gets copies moved to each of these times
   SlabWatch* watch = nullptr;  ///< lets stepping methods abandon a long slab; null: it is always completed
   double boxes = 0;            ///< set by free flight: PastEpoch::boxes of this slab and rank
+  LocalError error{};          ///< set by methods that adapt: the largest one in this slab
   double reached = 0;  ///< set by the integrator: the time reached within the slab; below the length only at a limit
 };
 
@@ -82,6 +85,9 @@ struct IntegratorInfo {
   bool exact = false;         ///< conserves energy to rounding at any step: a jump ends the run
   bool local = false;         ///< each rank needs only its own particles and nearby ones; false: all particles
   bool shadow = false;        ///< a Verlet type: report the shadow energy S_h
+  bool adapts = false;        ///< steps may have any lengths: SlabReport::error and StepTooLong choose them
+  /// Contacts of a sphere in a slab above which shorter slabs are cheaper; infinite: slabs may have any number.
+  double most_contacts = std::numeric_limits<double>::infinity();
   std::unique_ptr<Integrator<2>> (*in_2d)(const Parameters&) = nullptr;
   std::unique_ptr<Integrator<3>> (*in_3d)(const Parameters&) = nullptr;
 
@@ -116,6 +122,8 @@ std::unique_ptr<Integrator<D>> make_integrator(std::string_view name, Parameters
 namespace parameter {
 Parameter step();
 Parameter longest_step();
+/// The keys of methods that choose their steps: an optional first `step`, `accuracy`, `shortest_step`, `longest_step`.
+std::vector<Parameter> adaptive_steps();
 Parameter max_events_per_step();
 }  // namespace parameter
 

@@ -119,6 +119,13 @@ void Box<D>::restart() {
 }
 
 template <int D>
+double Box<D>::longest_step() const {
+  double highest = 0;
+  for (const WallOptions<D>& each : options) highest = std::max(highest, each.frequency);
+  return kLongestStep / highest;
+}
+
+template <int D>
 void Box<D>::check(Failure failure) const {
   for (const WallOptions<D>& each : options)
     if (each.frequency * step > kLongestStep)

@@ -125,6 +125,8 @@ struct Box {
     time = step_start = start;
     step = length;
   }
+  /// The longest step that the walls allow; infinite if none is shaken [time].
+  double longest_step() const;
   /// Makes the present time the time 0 of a new run; walls and ramps go on.
   void restart();
   /// Throws Error(failure) if two parallel walls leave no room between them, or a step is too long for a shaken wall.

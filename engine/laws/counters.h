@@ -16,6 +16,7 @@ struct Counters : ContactTally {
   std::uint64_t sweeps = 0;  ///< iterations of implicit solves
   std::uint64_t pieces = 0;  ///< edda: pieces in which steps were solved; more than the steps if any step was cut
   std::uint64_t slabs_halved = 0;
+  std::uint64_t steps_rejected = 0;  ///< steps repeated because they were not accurate enough
   std::uint64_t fallbacks = 0;     ///< mcva: plain elastic impulses; edda: searches for the highest frequency
   std::uint64_t frozen = 0;        ///< edda: particles that kept the acceleration of an earlier sweep
   double folded = 0;               ///< edda: Σ|r|, the energy errors folded into velocities [energy]
@@ -31,7 +32,7 @@ struct Counters : ContactTally {
 
   void archive(Archive& archive) {
     ContactTally::archive(archive);
-    archive(force_passes, sweeps, pieces, slabs_halved, fallbacks, frozen, folded, divisions, slabs_again, slabs_by_all,
+    archive(force_passes, sweeps, pieces, slabs_halved, steps_rejected, fallbacks, frozen, folded, divisions, slabs_again, slabs_by_all,
             events, windows, seconds);
   }
 };

@@ -75,7 +75,7 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
   fields.add_value("sampled walls", sampled_walls_);
   fields.add_value("transient", transient_);
   fields.add_value("end of the transient", transient_end_);
-  static_assert(sizeof(Readings<D>) == (10 + D) * sizeof(double) && alignof(Readings<D>) == sizeof(double),
+  static_assert(sizeof(Readings<D>) == (11 + D) * sizeof(double) && alignof(Readings<D>) == sizeof(double),
                 "a checkpoint holds these bytes: no padding, or a new format");
   fields.add_value<Readings<D>>("last measurement", shot_);
   if (system.box.contacts.rough())
@@ -200,9 +200,9 @@ void Monitor<D>::sample(double time, const Particles<D>& state) {
 }
 
 template <int D>
-void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bool last) {
+void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bool whole, bool last) {
   const Statistics& s = statistics_;
-  const bool due = last || std::min(frames_.due(), rows_.due()) <= s.end_time + plan_.slack();
+  const bool due = last || (whole && std::min(frames_.due(), rows_.due()) <= s.end_time + plan_.slack());
   const bool soon = due || s.steps == s.start_steps + 1 || !info_.stepping || !system_.decomposition.joined() ||
                     (waits() && transient_end_);
   const bool with_shadow =
@@ -214,7 +214,7 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
   at_contacts.worst = {};
   if (info_.hard_cores) slab.own.overlaps.add(overlaps(elapsed));
   if (soon || with_shadow || waiting_.size() == kMostWaiting) settle();
-  sample(s.end_time, system_.particles);
+  if (whole) sample(s.end_time, system_.particles);
   if (due) show(shot_, false);
 }
 
@@ -356,6 +356,7 @@ Snapshot<D> Monitor<D>::measured(const Waiting& at, const Sums& sums) {
   shot.dissipated = at.tally.dissipated.value();
   shot.work = at.tally.work.value();
   shot.heat = at.tally.heat.value();
+  shot.step_length = statistics_.step_length;
   // The conserved quantity: the energy of the spheres, what they have lost, and less what walls and baths gave them.
   account_.energy = shot.kinetic + sums.potential.energy.value() + (shot.dissipated - shot.work - shot.heat);
   account_.magnitude = found.magnitude;

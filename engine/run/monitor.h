@@ -64,9 +64,10 @@ class Monitor {
   /// Shows copies of the particles flown to a due time inside a slab.
   void observe(double time, const Particles<D>& copies);
 
-  /// Measures the state at the end of a slab, updates the statistics, and shows the state if it is due or `last`.
+  /// Measures the state at the end of a slab, updates the statistics, and shows the state if it is due, at the end of a
+  /// `whole` step, or `last`.
   /// statistics.steps and end_time already include the slab, which advanced the time by `elapsed`.
-  void end_of_slab(double elapsed, const Integrator<D>& integrator, bool last);
+  void end_of_slab(double elapsed, const Integrator<D>& integrator, bool whole, bool last);
 
   /// Forgets slabs that wait for their sums, because another state will be restored.
   void forget() { waiting_.clear(); }

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "engine/base/elementary.h"
+#include "engine/base/error.h"
 #include "engine/run/simulation.h"
 
 namespace carom {
@@ -15,19 +17,45 @@ namespace {
 /// positions.
 constexpr double kLongestEpoch = 1e9;
 
+/// The rate of contacts is known to an eighth from this number. It is that of the last contacts or, in a system that
+/// has more in a slab, of the last slab.
+constexpr double kContactsOfRate = 64;
+
+/// The largest change of the length from slab to slab: an acceleration that happens not to change says nothing about
+/// the next step.
+constexpr double kMostGrowth = 2, kMostShrinkage = 0.25;
+
+/// The largest power of 2^(1/4) that is not above a positive number: with few lengths, most steps have equal lengths,
+/// and the extrapolation of accelerations is good.
+double rounded_down(double length) {
+  int exponent = 0;
+  const double mantissa = std::frexp(length, &exponent);  // from 0.5 to 1
+  for (const double power : {0x1.ae89f995ad3adp-1, 0x1.6a09e667f3bcdp-1, 0x1.306fe0a31b715p-1})
+    if (mantissa >= power) return std::ldexp(power, exponent);
+  return std::ldexp(0.5, exponent);
+}
+
 }  // namespace
 
 RunClock::RunClock(const Plan& plan, bool stepping, std::size_t particles)
-    : plan_(plan), stepping_(stepping), most_collisions_(std::max<std::uint64_t>(500'000, 4 * particles)) {}
+    : plan_(plan),
+      stepping_(stepping),
+      particles_(static_cast<double>(std::max<std::size_t>(1, particles))),
+      most_collisions_(std::max<std::uint64_t>(500'000, 4 * particles)) {}
 
 double RunClock::time_after(std::int64_t steps) const {
-  return count.time + static_cast<double>(steps - count.steps) * plan_.step;
+  return count.time + static_cast<double>(steps - count.steps) * step();
 }
 
 double RunClock::length_from(double start) const {
   const double left = plan_.end_time.value_or(std::numeric_limits<double>::infinity()) - start;
-  return left < plan_.step - plan_.end_slack() ? left : plan_.step;
+  return left < step() - plan_.end_slack() ? left : step();
 }
+
+bool RunClock::adapts() const { return plan_.accuracy > 0; }
+
+/// The length of a step, unless an end makes it shorter.
+double RunClock::step() const { return adapts() && pace.length > 0 ? pace.length : plan_.step; }
 
 Slab RunClock::next_slab(const Statistics& s) const {
   Slab slab;
@@ -43,6 +71,12 @@ Slab RunClock::next_slab(const Statistics& s) const {
   const double length =
       slab.steps == 1 ? length_from(time_after(slab.index)) : static_cast<double>(slab.steps) * plan_.step;
   slab.length = length - count.within;
+  slab.accuracy = plan_.accuracy;
+  if (const double parts = std::ceil((1 - 1e-9) * slab.length / pace.length);
+      pace.length > 0 && !adapts() && parts > 1) {
+    slab.length /= parts;
+    slab.ends_step = false;
+  }
   if (!stepping_) {
     slab.contact_limit = 2 * most_collisions_;
     slab.collision_limit =
@@ -72,10 +106,10 @@ bool RunClock::is_last_on_the_way(const Statistics& s) const {
   const Slab next = next_slab(s);
   // A slab that meets an end may differ from a step by rounding alone.
   const bool whole =
-      !cut_ && s.end_time == next.start &&
-      (s.steps == s.start_steps || count.within > 0 || length_from(time_after(s.steps - 1)) == plan_.step);
+      !cut_ && whole_ && s.end_time == next.start &&
+      (adapts() || s.steps == s.start_steps || count.within > 0 || length_from(time_after(s.steps - 1)) == plan_.step);
   if (!whole) return false;
-  if (finished(s) || next.steps < count.stride || length_from(time_after(s.steps)) != plan_.step) return true;
+  if (finished(s) || next.steps < count.stride || length_from(time_after(s.steps)) != step()) return true;
   // Free flight ends within a slab at its last collision; the slab before predicts the number of collisions.
   return plan_.collisions && next.collision_limit == *plan_.collisions &&
          (!last_collisions_ || s.counters.sphere_sphere + 2 * *last_collisions_ + 1000 >= *plan_.collisions);
@@ -87,8 +121,15 @@ double RunClock::end_slab(const Slab& slab, double reached, std::uint64_t pairs,
   cut_ = slab.steps < count.stride;
   count.contacts += 2 * pairs + walls;
   count.boxes = std::max(count.boxes, boxes);
+  if (adapts()) {
+    const double end = slab.start + slab.length;
+    ++s.steps;
+    s.end_time = plan_.end_time && *plan_.end_time - end <= plan_.end_slack() ? *plan_.end_time : end;
+    count = {.steps = s.steps, .time = s.end_time, .first_speed = count.first_speed};
+    return slab.length;
+  }
   const double step = length_from(time_after(slab.index));
-  if (reached < slab.length) {
+  if (reached < slab.length || !slab.ends_step) {
     const double within = count.within + reached;
     s.end_time = time_after(slab.index) + within;
     if (finished(s))
@@ -110,6 +151,36 @@ void RunClock::lengthen(double steps) {
   if (count.stride > before) *last_collisions_ *= static_cast<std::uint64_t>(count.stride / before + 1);
   count.contacts = 0;
   count.boxes = 0;
+}
+
+void RunClock::adapt(const Slab& slab, const LocalError& error, std::uint64_t contacts, const SlabLimits& limits) {
+  const auto happened = static_cast<double>(contacts);
+  const double kept = std::min(1.0, kContactsOfRate / (pace.contacts + happened));
+  pace.contacts = kept * pace.contacts + happened;
+  pace.time = kept * pace.time + slab.length;
+  double length = limits.contacts * particles_ * (pace.time / pace.contacts);  // infinite without contacts
+  if (!adapts()) {
+    pace.length = std::isfinite(length) ? length : 0;
+    return;
+  }
+  whole_ = !(slab.length < pace.length);
+  if (error.rate > 0) length = std::min(length, elementary::cbrt(plan_.accuracy / error.rate));
+  length = std::min(std::clamp(length, kMostShrinkage * pace.length, kMostGrowth * pace.length), limits.length);
+  pace.length = std::max(rounded_down(length), plan_.shortest_step);
+}
+
+void RunClock::shorten(const Slab& slab, const StepTooLong& wanted) {
+  const double length = std::max(wanted.length, plan_.shortest_step);
+  if (!(length < slab.length) || !(slab.start + length > slab.start))
+    throw Error(Failure::numerical, "a step of " + short_text(slab.length) + " changes the acceleration of particle " +
+                                        std::to_string(wanted.id) + " too much for an accuracy of " +
+                                        short_text(plan_.accuracy) +
+                                        (length < slab.length ? ", and a shorter one does not change the time; give a "
+                                                                "larger integrator.accuracy"
+                                                              : ", and shortest_step allows no shorter one; give a "
+                                                                "shorter integrator.shortest_step, or a larger "
+                                                                "integrator.accuracy"));
+  pace.length = length;
 }
 
 void RunClock::go_on(const Statistics& s) {

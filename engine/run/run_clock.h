@@ -5,9 +5,11 @@
 //
 // Step n ends at a whole multiple of the step after the origin of the count, so that rounding does not accumulate. The
 // last step may be shortened to end at Plan::end_time. An epoch of free flight may need several slabs, and may be as
-// long as several steps.
+// long as several steps. With Plan::accuracy each step has a length of its own (Pace), and the count starts anew after
+// each step. A step of fixed length has several slabs if one would have too many contacts.
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 
 #include "engine/integrators/integrator.h"
@@ -30,6 +32,19 @@ struct StepCount {
   /// Free flight with contacts that dissipate: if the gas is k times slower than at the start, an epoch has k steps.
   double first_speed = 0;   ///< thermal speed at the start [length/time]
   std::int64_t stride = 1;  ///< steps of the next slab
+};
+
+/// The lengths of slabs of methods that adapt.
+struct Pace {
+  double length = 0;  ///< the longest of the next slab; 0: that of a step [time]
+  /// Recent contacts (of two spheres: two) and the time in which they happened.
+  double contacts = 0, time = 0;
+};
+
+/// The limits of slabs.
+struct SlabLimits {
+  double contacts = std::numeric_limits<double>::infinity();  ///< of a sphere
+  double length = std::numeric_limits<double>::infinity();    ///< [time]
 };
 
 class RunClock {
@@ -59,15 +74,27 @@ class RunClock {
   double most_steps() const;
   /// Sets the number of steps of the next epoch. Call when one is complete.
   void lengthen(double steps);
+  /// Sets the length of the next slabs after a complete one with this local error and number of contacts (of two
+  /// spheres: two).
+  void adapt(const Slab& slab, const LocalError& error, std::uint64_t contacts, const SlabLimits& limits);
+  /// Makes the slab shorter that was not accurate enough and will be repeated. Throws Error if it would be too short.
+  void shorten(const Slab& slab, const StepTooLong& wanted);
+  /// Whether each step has a length of its own.
+  bool adapts() const;
   /// Call before a run goes on to another end: counts from here if the last slab was shortened to meet the previous
   /// one.
   void go_on(const Statistics& s);
 
   StepCount count;  ///< state of the run
+  Pace pace;        ///< state of the run
 
  private:
+  double step() const;
+
   const Plan& plan_;
   bool stepping_;
+  double particles_;
+  bool whole_ = true;                             // with Plan::accuracy: the end did not shorten the last slab
   std::uint64_t most_collisions_;                 // per slab of an epoch
   std::optional<std::uint64_t> last_collisions_;  // in the last slab, if this run has executed one
   bool cut_ = false;                              // whether the end of the plan shortened the last slab by whole steps

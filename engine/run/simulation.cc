@@ -2,14 +2,19 @@
 #include "engine/run/simulation.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
+#include "engine/base/elementary.h"
 #include "engine/base/error.h"
 #include "engine/forces/forces.h"
 #include "engine/laws/wall_options.h"
+#include "engine/ranks/id_blocks.h"
 #include "engine/run/baths.h"
 #include "engine/run/monitor.h"
 #include "engine/setup/epoch.h"
 #include "engine/setup/initial_state.h"
+#include "engine/stepping/local_error.h"
 
 namespace carom {
 
@@ -25,6 +30,11 @@ constexpr double kMostCells = 0x1p52;
 constexpr double kMostOscillations = 1e9;
 /// Flight distance without any pair collision after which a run in an open box ends [longest edge].
 constexpr double kFarApart = 1e4;
+/// Plan::accuracy if no step is given.
+constexpr double kDefaultAccuracy = 1e-4;
+/// Plan::step if no particle moves at the start and no step is given, relative to the end of the run. The forces at the
+/// start make the first step shorter.
+constexpr double kStepAtRest = 1e-3;
 
 template <int D>
 double largest_radius(const System<D>& system) {
@@ -112,6 +122,13 @@ void refuse_endless(const Plan& plan, const IntegratorInfo* info, bool ramp) {
 
 Plan checked(const Plan& plan, const IntegratorInfo& info, const Bath& bath) {
   if (!(plan.step > 0)) throw Error(Failure::deck, "the step must be positive");
+  if (plan.accuracy > 0 && !info.adapts)
+    throw Error(Failure::deck,
+                "'" + std::string(info.name) +
+                    "' has fixed steps, because the energy is exact at any step with edda and cdda only; "
+                    "leave accuracy out, or take one of these");
+  if (plan.shortest_step > plan.step)
+    throw Error(Failure::deck, "shortest_step is longer than the step; give a shorter one, or none");
   if (plan.longest_step != 0 && !(plan.longest_step >= plan.step))
     throw Error(Failure::deck, "longest_step is shorter than the step; give a longer one, or none");
   refuse_endless(plan, &info, bath.needs_ramp_time());
@@ -133,10 +150,47 @@ EndlessRun endless(const Plan& plan, const IntegratorInfo* info, bool ramp) {
   return {};
 }
 
+template <int D>
+void choose_step(const System<D>& system, const IntegratorInfo& info, const Plan& plan, Parameters& given,
+                 double step) {
+  if (!info.stepping) return choose_epoch(system, given, step);
+  if (!info.adapts || given.has("step")) return;
+  if (!given.has("accuracy")) given.set("accuracy", kDefaultAccuracy);
+  if (step == 0) {
+    Communicator alone;
+    const auto& p = system.particles;
+    const double fastest = accumulated_in_order(
+        system.decomposition.others() ? *system.decomposition.others() : alone, 0.0, [&](double& most) {
+          for (Id i = 0; i < p.size(); ++i)
+            most = std::max(most, p.v[i].norm() / length_of_error(p.radius[i], mean_distance(system)));
+        });
+    step = elementary::cbrt(given.real("accuracy")) / fastest;
+  }
+  if (!std::isfinite(step)) step = plan.end_time ? kStepAtRest * *plan.end_time : 1;
+  given.set("step", step);
+}
+template void choose_step(const System<2>&, const IntegratorInfo&, const Plan&, Parameters&, double);
+template void choose_step(const System<3>&, const IntegratorInfo&, const Plan&, Parameters&, double);
+
+void set_steps(Plan& plan, const Parameters& parameters) {
+  const auto take = [&](const char* name, double& value) {
+    if (const auto* const given = parameters.find<double>(name)) value = *given;
+  };
+  take("step", plan.step);
+  take("longest_step", plan.longest_step);
+  take("accuracy", plan.accuracy);
+  take("shortest_step", plan.shortest_step);
+}
+
 std::array<double, 2> ramp_times(const Plan& plan, std::int64_t start_step, double start_time) {
   refuse_endless(plan, nullptr, true);
   double end = plan.end_time.value_or(std::numeric_limits<double>::infinity());
-  if (plan.steps) end = std::min(end, start_time + static_cast<double>(*plan.steps - start_step) * plan.step);
+  if (plan.accuracy > 0 && !plan.end_time)
+    throw Error(Failure::deck,
+                "the temperature of the bath is a ramp over a run of steps whose lengths are not known; give "
+                "run.end_time, or the ramp_time of the bath");
+  if (plan.steps && plan.accuracy == 0)
+    end = std::min(end, start_time + static_cast<double>(*plan.steps - start_step) * plan.step);
   return {start_time, end};
 }
 
@@ -157,10 +211,9 @@ typename Simulation<D>::Prepared Simulation<D>::prepare(const System<D>& system,
   if (plan.step != 0 && given.has("step"))
     throw Error(Failure::deck, "the step is given twice; give it with the plan or with the integrator, not with both");
   if (plan.step != 0) given.set("step", plan.step);
-  if (!info.stepping) choose_epoch(system, given);
+  choose_step(system, info, plan, given);
   given = completed(info.name, info.parameters, std::move(given));
-  plan.step = given.real("step");
-  if (given.has("longest_step")) plan.longest_step = given.real("longest_step");
+  set_steps(plan, given);
   return {info.make<D>(given), plan};
 }
 
@@ -191,6 +244,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
     monitor_ = std::make_unique<Monitor<D>>(*system_, info_, plan_, observers_, s);
     system_->fields.add_value("quiet since", quiet_since_);
     system_->fields.add_value("step count", clock_.count);
+    system_->fields.add_value("pace", clock_.pace);
   };
   const bool again = monitor_ != nullptr;
   if (!again) {
@@ -208,6 +262,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
     if (!hooks.branch) make_monitor();
     first_of_integrator_ = system_->fields.of_run().size();
     integrator_->start(*system_, s.counters);
+    if (clock_.adapts()) clock_.pace.length = first_step();
   }
   if (again || hooks.restore) {
     decomposition.to_blocks();
@@ -237,7 +292,7 @@ void Simulation<D>::run(const Hooks& hooks) {
   Statistics& s = statistics_;
   begin(hooks);
   set_ramp();
-  SlabWatch watch(system_->fields, first_of_integrator_, hooks.leave, hooks.leave_here);
+  SlabWatch watch(system_->fields, first_of_integrator_, clock_.adapts(), hooks.leave, hooks.leave_here);
   const double seconds_before = s.wall_seconds;
   const auto take_time = [&] {
     const auto elapsed = std::chrono::steady_clock::now() - clock_start;
@@ -261,7 +316,7 @@ void Simulation<D>::run(const Hooks& hooks) {
       break;
     }
     if (done) break;
-    const Slab slab = clock_.next_slab(s);
+    Slab slab = clock_.next_slab(s);
     s.counters.divisions += system_->decomposition.divide_if_due(slab.index, slab.length);
     const std::vector<double> due = info_.stepping ? std::vector<double>{} : monitor_->due_within(slab);
     contacts.clear();
@@ -279,18 +334,20 @@ void Simulation<D>::run(const Hooks& hooks) {
       if (hooks.left) hooks.left();
       continue;
     }
-    act_of_bath(slab, report);
     show_contacts(slab);
     s.counters.seconds.communicate = system_->decomposition.seconds_waited();
     const std::uint64_t pairs = s.counters.sphere_sphere - collisions, walls = s.counters.sphere_wall - at_walls;
     if (pairs > 0) quiet_since_ = slab.start + report.reached;
     const double complete = clock_.end_slab(slab, report.reached, pairs, walls, report.boxes, s);
-    if (complete > 0 && !system_->box.bath.rescales()) lengthen_slabs(complete);
+    act_of_bath(slab, complete, report);
+    if (info_.adapts) adapt(slab, report, 2 * pairs + walls, complete);
+    if (complete > 0) s.step_length = complete;
+    if (complete > 0 && !system_->box.bath.rescales() && !clock_.adapts()) lengthen_slabs(complete);
     if (!info_.stepping && plan_.collisions && !plan_.end_time && !plan_.steps) need_collisions();
     s.force_passes = s.counters.force_passes;
     s.fraction_done = clock_.fraction_done(s);
     take_time();
-    monitor_->end_of_slab(report.reached, *integrator_, clock_.finished(s));
+    monitor_->end_of_slab(report.reached, *integrator_, complete > 0 || !info_.stepping, clock_.finished(s));
     for (auto* observer : observers_) observer->progress(s);
   }
   // Rows and frames have the time of the step, as in a longer run.
@@ -300,10 +357,10 @@ void Simulation<D>::run(const Hooks& hooks) {
   take_time();
 }
 
-/// Advances the system by a slab, and repeats it with a wider halo if needed; false: the slab was abandoned, and the
-/// state is that of its start.
+/// Advances the system by a slab, and repeats it with a wider halo, or made shorter, if needed; false: the slab was
+/// abandoned, and the state is that of its start.
 template <int D>
-bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watch) {
+bool Simulation<D>::fly(Slab& slab, SlabReport<D>& report, SlabWatch& watch) {
   Decomposition<D>& decomposition = system_->decomposition;
   const double diameter = info_.hard_cores && !system_->box.plain() ? 2 * largest_radius(*system_) : 0;
   const auto no_room_text = [&](double after) {
@@ -333,6 +390,14 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
       before.slabs_by_all += decomposition.knows_all() ? 1 : 0;
       report.counters = before;
       if (report.contacts) report.contacts->clear();
+    } catch (const StepTooLong& wanted) {
+      watch.restore();
+      ++before.steps_rejected;
+      report.counters = before;
+      report.error = {};
+      if (report.contacts) report.contacts->clear();
+      clock_.shorten(slab, wanted);
+      slab = clock_.next_slab(statistics_);
     } catch (SlabLeft) {
       watch.restore();
       report.counters = before;
@@ -349,14 +414,70 @@ bool Simulation<D>::fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watc
     }
 }
 
-/// What the bath does at the end of a slab: rescaling at the end of a whole step or epoch, all kicks of a step.
+/// What the bath does at the end of a slab: rescaling at the end of a step or epoch of the length `complete` (0: it
+/// goes on), all kicks of a slab of a stepping method.
 template <int D>
-void Simulation<D>::act_of_bath(const Slab& slab, SlabReport<D>& report) {
+void Simulation<D>::act_of_bath(const Slab& slab, double complete, SlabReport<D>& report) {
   const Bath& bath = system_->box.bath;
-  const double start = clock_.time_after(slab.index), length = clock_.length_from(start);
-  if (bath.rescales() && !(report.reached < slab.length))
-    rescale(*system_, slab.index, start + length, length, report.counters);
+  const double start = clock_.adapts() ? slab.start : clock_.time_after(slab.index),
+               length = clock_.adapts() ? slab.length : clock_.length_from(start);
+  if (bath.rescales() && complete > 0) rescale(*system_, slab.index, start + length, length, report.counters);
   if (bath.kicks() && info_.stepping) kick_all(*system_, slab.start, slab.length, report.counters);
+}
+
+/// The first step if the method chooses its steps: at most Plan::step, and so short that no particle moves farther than
+/// its diameter times the cube root of the accuracy, by its velocity or by forces. An acceleration a that changes to
+/// its own size over a diameter d changes at the rate j = a v/d, and a h² = 2 d ε^(1/3) and v h = d ε^(1/3) make the
+/// local error j h³/12 = d ε^(2/3)/6. That is too long, but for the smooth parts of most forces by less than the factor
+/// of ten that a few repetitions of the step find, or a few doublings make good.
+template <int D>
+double Simulation<D>::first_step() {
+  const System<D>& system = *system_;
+  const auto& p = system.particles;
+  std::vector<Vec<D>> force(p.size());
+  Counters uncounted;
+  evaluate_forces<D>(system, p.x, force, uncounted);
+  const double distance = mean_distance(system);
+  double speed = 0, strength = 0;  // of the fastest and of the most accelerated particle, in diameters
+  for (Id i = 0; i < p.size(); ++i) {
+    if (p.fixed(i) || !p.owns(i)) continue;
+    const double length = length_of_error(p.radius[i], distance);
+    speed = std::max(speed, p.v[i].norm() / length);
+    strength = std::max(strength, force[i].norm() / (p.mass[i] * length));
+  }
+  std::array<double, 2> most{speed, strength};
+  system.decomposition.ranks().largest(most);
+  const double part = elementary::cbrt(plan_.accuracy);
+  double length = std::min({plan_.step, part / most[0], std::sqrt(2 * part / most[1]), longest_step()});
+  return std::max(length, plan_.shortest_step);
+}
+
+/// The longest step that the plan, the walls and the bath allow: a bath that acts at the ends of steps moves the
+/// kinetic energy by at most a tenth of its distance from the mean at once.
+template <int D>
+double Simulation<D>::longest_step() const {
+  constexpr double kOfRelaxation = 0.1;
+  const Bath& bath = system_->box.bath;
+  double longest = std::min(system_->box.longest_step(),
+                            plan_.longest_step > 0 ? plan_.longest_step : std::numeric_limits<double>::infinity());
+  if (bath.type != Bath::Type::none && bath.rate > 0) longest = std::min(longest, kOfRelaxation / bath.rate);
+  return longest;
+}
+
+/// Counts the slab of a method that adapts, and sets the length of the next one.
+template <int D>
+void Simulation<D>::adapt(const Slab& slab, const SlabReport<D>& report, std::uint64_t contacts, double complete) {
+  Statistics& s = statistics_;
+  if (const double error = report.error.of(slab.length); error > s.local_error) {
+    s.local_error = error;
+    s.local_error_id = report.error.id;
+    s.local_error_time = s.end_time;
+  }
+  if (complete > 0 && !(clock_.adapts() && slab.length < clock_.pace.length)) {
+    s.shortest_step = s.shortest_step > 0 ? std::min(s.shortest_step, complete) : complete;
+    s.longest_step = std::max(s.longest_step, complete);
+  }
+  clock_.adapt(slab, report.error, contacts, {info_.most_contacts, longest_step()});
 }
 
 /// Sets the times of a ramp of the bath's temperature, unless they are given or an earlier plan has set them.

@@ -26,8 +26,14 @@ namespace carom {
 
 /// When a run ends and what observers get on the way. At least one end is given; the run stops at the first it reaches.
 struct Plan {
-  double step = 0;          ///< length of a step [time], > 0
-  double longest_step = 0;  ///< up to which steps lengthen as a gas with inelastic contacts cools [time]; 0: never
+  double step = 0;  ///< length of a step [time], > 0
+  /// The longest step that the method chooses, 0: any. Of fixed steps: up to which they lengthen as a gas with
+  /// inelastic contacts cools, 0: never [time].
+  double longest_step = 0;
+  /// The method chooses its steps, `step` is the first one: the local error of a step (engine/stepping/local_error.h)
+  /// that is wanted; 0: steps are fixed.
+  double accuracy = 0;
+  double shortest_step = 0;             ///< of those that the method chooses [time]
   std::optional<std::int64_t> steps{};  ///< number of steps
   std::optional<double> end_time{};     ///< the last step is shortened to end there
   std::optional<std::uint64_t>
@@ -45,6 +51,15 @@ struct Plan {
     return std::max(slack(), 4 * std::numeric_limits<double>::epsilon() * end_time.value_or(0));
   }
 };
+
+/// Completes the parameters of a method that chooses its steps, or epochs, if no step is given: the first step, or
+/// `step`, which was the first one when the run began. Collective.
+template <int D>
+void choose_step(const System<D>& system, const IntegratorInfo& info, const Plan& plan, Parameters& given,
+                 double step = 0);
+
+/// Takes the steps of a plan from the parameters of its method.
+void set_steps(Plan& plan, const Parameters& parameters);
 
 /// Why a run, or a ramp of its bath, would never end. `what` is empty if it ends.
 struct EndlessRun {
@@ -80,6 +95,7 @@ struct Readings {
   double temperature = 0;  ///< Σ m v²/(D N) of the N particles that are not fixed, in units of energy (k_B = 1); total
                            ///< momentum is not subtracted
   double dissipated = 0, work = 0, heat = 0;  ///< sums of ContactTally so far [energy]
+  double step_length = 0;                     ///< of the last step or epoch [time]
 };
 
 /// The numbers of a Snapshot that runs with rough contacts store in addition.
@@ -134,6 +150,9 @@ class Observer {
 /// Statistics of a run: current while it runs, final once run() has returned.
 struct Statistics {
   std::int64_t steps = 0;
+  double step_length = 0;  ///< of the last step [time]
+  /// Of the steps of this run, without the last one if the end made it shorter; 0: there was none [time].
+  double shortest_step = 0, longest_step = 0;
   double end_time = 0;       ///< simulated time reached
   double fraction_done = 0;  ///< part of the plan that is done, 0…1
   /// Where a branch started. Its sums, means and extremes are of the steps after this state.
@@ -150,6 +169,10 @@ struct Statistics {
   /// The long-range corrections (engine/forces/potentials/tail.h), which the energies above and the pressures include.
   /// They are constants; energy_reference and the errors of H exclude them.
   double tail_energy = 0, tail_pressure = 0;
+  /// The largest local error of a slab, estimated by edda and cdda, of fixed steps now and then; its particle and the
+  /// time at the end of the slab.
+  double local_error = 0, local_error_time = 0;
+  std::uint64_t local_error_id = 0;
   double max_energy_error = 0;  ///< max over all steps of |E − E₁|, E = H + dissipated − work − heat, E₁ after the
                                 ///< first step (free flight: at the start)
   std::optional<double>
@@ -190,7 +213,8 @@ struct Statistics {
   }
 
   void archive(Archive& archive) {
-    archive(steps, end_time, fraction_done, start_steps, start_time, counters, force_passes, energy_initial,
+    archive(steps, step_length, shortest_step, longest_step, end_time, fraction_done, start_steps, start_time,
+            local_error, local_error_time, local_error_id, counters, force_passes, energy_initial,
             energy_after_first_step, energy_final, first_step_error, energy_reference, energy_scale, tail_energy,
             tail_pressure, max_energy_error, max_shadow_energy_error, max_momentum_error, overlap, mean_pressure,
             collision_rate, mean_free_time, mean_free_path, equilibrium, series, wall_seconds, stopped_early);
@@ -273,8 +297,11 @@ class Simulation {
       : Simulation(std::move(system), info, std::move(p.integrator), p.plan) {}
 
   void begin(const Hooks& hooks);
-  bool fly(const Slab& slab, SlabReport<D>& report, SlabWatch& watch);
-  void act_of_bath(const Slab& slab, SlabReport<D>& report);
+  bool fly(Slab& slab, SlabReport<D>& report, SlabWatch& watch);
+  void act_of_bath(const Slab& slab, double complete, SlabReport<D>& report);
+  double first_step();
+  double longest_step() const;
+  void adapt(const Slab& slab, const SlabReport<D>& report, std::uint64_t contacts, double complete);
   void set_ramp();
   void lengthen_slabs(double length);
   void need_collisions() const;

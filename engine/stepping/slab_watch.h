@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
-// Lets a run stop within a long step and restores the state at the start of the step.
+// Lets a run stop within a long step, or repeat a step that is too long, from the state at the start of the step.
 //
 // Between pieces, sweeps and contacts an integrator calls before_change() or look(), which throw SlabLeft on all ranks
 // together if the run is to stop. The first before_change() of a slab copies the state, so a slab without one costs no
@@ -13,24 +13,45 @@
 #include <vector>
 
 #include "engine/base/fields.h"
+#include "engine/base/vec.h"
 
 namespace carom {
 
 /// Thrown on all ranks together: the slab is abandoned.
 struct SlabLeft {};
 
+/// The largest local error of any particle (local_error.h), relative to its diameter; of a point: to the mean distance
+/// of the particles.
+struct LocalError {
+  double rate = 0;  ///< the error of a step of length h is rate · h³ [1/time³]
+  Id id = 0;        ///< the particle
+  double of(double length) const { return rate * length * length * length; }
+};
+
+/// Thrown on all ranks together: the slab is not accurate enough, and is repeated with this length.
+struct StepTooLong {
+  double length = 0;
+  Id id = 0;  ///< the particle with the largest error
+};
+
 class SlabWatch {
  public:
   /// `leave` says whether to abandon the slab; it is called now and then and is collective. `leave_here` is the request
-  /// of this rank alone. The integrator's entries in the registry of run state begin at `first`.
-  SlabWatch(Fields& fields, std::size_t first, std::function<bool()> leave, std::function<bool()> leave_here)
-      : fields_(fields), first_(first), leave_(std::move(leave)), leave_here_(std::move(leave_here)) {}
+  /// of this rank alone. `repeats`: a slab may be repeated after StepTooLong. The integrator's entries in the registry
+  /// of run state begin at `first`.
+  SlabWatch(Fields& fields, std::size_t first, bool repeats, std::function<bool()> leave,
+            std::function<bool()> leave_here)
+      : fields_(fields),
+        first_(first),
+        repeats_(repeats),
+        leave_(std::move(leave)),
+        leave_here_(std::move(leave_here)) {}
 
   // Functions that integrators call.
 
   /// Call this before the system changes within a slab: copies the state at its start once, then look(). Collective.
   void before_change() {
-    if (!kept_ && leave_) keep();
+    if (!kept_ && (leave_ || repeats_)) keep();
     look();
   }
   /// Throws SlabLeft if the run is to stop. Collective.
@@ -44,7 +65,7 @@ class SlabWatch {
 
   /// Call this when a slab starts, or starts again.
   void begin() { kept_ = false; }
-  /// Call this after SlabLeft: restores the state at the slab's start.
+  /// Call this after SlabLeft or StepTooLong: restores the state at the slab's start.
   void restore() {
     if (!kept_) return;
     std::size_t k = 0;
@@ -81,6 +102,7 @@ class SlabWatch {
 
   Fields& fields_;
   std::size_t first_;
+  bool repeats_;
   std::function<bool()> leave_, leave_here_;
   bool kept_ = false;
   std::vector<Bytes> of_particles_, of_run_;

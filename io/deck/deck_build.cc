@@ -110,10 +110,10 @@ void complete_values(Deck& deck, System<D>& system, const GivenState* given, Pro
     source.values.find("placement")
         ->values.set("distance", default_distance<D>(source.particles(), system.box.volume()));
   if (deck.plan.step == 0) {
-    choose_epoch(system, deck.integrator_parameters);
-    deck.plan.step = deck.integrator_parameters.real("step");
-    for (const char* const name : {"step", "lengthen"})
-      source.values.find("integrator")->values.set(name, deck.integrator_parameters.all().find(name)->second);
+    choose_step(system, *source.integrator, deck.plan, deck.integrator_parameters);
+    set_steps(deck.plan, deck.integrator_parameters);
+    for (const auto& [name, value] : deck.integrator_parameters.all())
+      source.values.find("integrator")->values.set(name, value);
   }
   if (Bath& bath = system.box.bath; bath.needs_ramp_time()) {
     const auto [start, end] = ramp_times(deck.plan, given ? given->steps : 0, given ? given->time : 0);

@@ -371,8 +371,7 @@ class Interpreter {
     source_.step = table->place("step");
     source_.integrator = &find_integrator(deck_.integrator);
     Plan& plan = deck_.plan;
-    table->read<double>("step", plan.step);
-    table->read<double>("longest_step", plan.longest_step);
+    set_steps(plan, deck_.integrator_parameters);
     if (plan.longest_step != 0 && plan.longest_step < plan.step)
       problems_.error(table->place("longest_step"), "'longest_step' is shorter than 'step'",
                       "give a longer one, or none");

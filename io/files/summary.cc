@@ -75,6 +75,14 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
     json["equilibration"] = {{"transient_end", s.equilibrium->transient_end}, {"start", s.equilibrium->start}};
   else if (deck.plan.from_equilibrium)
     json["equilibration"] = nullptr;
+  if (find_integrator(deck.integrator).adapts)
+    json["step_lengths"] = {
+        {"rejected", c.steps_rejected},
+        {"shortest", s.shortest_step},
+        {"mean",
+         s.steps > s.start_steps ? (s.end_time - s.start_time) / static_cast<double>(s.steps - s.start_steps) : 0.0},
+        {"longest", s.longest_step},
+        {"local_error", s.local_error}};
   if (s.rotational_energy) json["energy"]["rotational"] = *s.rotational_energy;
   for (const WallRecord& wall : outcome.walls) {  // both sides of a wall have one name
     const WallTally none, &tally = wall.number < c.walls.size() ? c.walls[wall.number] : none;

@@ -56,7 +56,9 @@ const std::vector<Column<D>>& columns() {
       {"rotational", number, "energy", "the part of K that is in spins",  //
        [](S s, int) { return s.rotational; }, "rotational_energy", "rotational_energy"},
       {"rotational_temperature", number, "energy", "Σ I ω²/(f N), f = 1 in two dimensions, 3 in three",  //
-       [](S s, int) { return s.rotational_temperature; }, "rotational_temperature", "rotational_temperature"}};
+       [](S s, int) { return s.rotational_temperature; }, "rotational_temperature", "rotational_temperature"},
+      {"step_length", number, "time", "length of the last step or epoch",  //
+       [](S s, int) { return s.step_length; }, "step_length", "step_length"}};
   return all;
 }
 template const std::vector<Column<2>>& columns();

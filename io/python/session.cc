@@ -413,15 +413,14 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
     warn_of_start();
   warnings_ = deck_warnings_;
   Parameters parameters = values_.find("integrator")->of_variant();
-  if (!method->stepping) choose_epoch(*system_, parameters, begun ? step_ : 0);
+  choose_step(*system_, *method, plan, parameters, begun ? step_ : 0);
   step_ = parameters.real("step");
   const double interval = plan.thermo_interval;
 
   std::optional<Simulation<D>> made;  // if this throws, the session keeps its system
   if (begun) {
     parameters = completed(method->name, method->parameters, std::move(parameters));
-    plan.step = step_;
-    if (parameters.has("longest_step")) plan.longest_step = parameters.real("longest_step");
+    set_steps(plan, parameters);
     made.emplace(std::move(system_), *method, method->make<D>(parameters), plan);
   } else {
     made.emplace(std::move(system_), *method, std::move(parameters), plan);

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+// The local error of a step, from which methods that conserve energy at any step choose their steps.
+//
+// A step of length h moves a particle as if its mean acceleration were constant. If the acceleration changes at the
+// rate j, the position at the end is wrong by ∫∫ j (t − h/2) dt dt = j h³/12. The mean accelerations a and a⁻ of this
+// step and the one before belong to the middles of the steps, so j = 2 |a − a⁻|/(h + h⁻).
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/forces/forces.h"
+#include "engine/stepping/slab_watch.h"
+
+namespace carom {
+
+/// The length to which the error of a particle is relative: its diameter or, of a point, the mean distance.
+inline double length_of_error(double radius, double mean_distance) { return radius > 0 ? 2 * radius : mean_distance; }
+
+/// The local error of a step of length h with mean accelerations a, if those of the step before, of length h_before,
+/// were a_before (h_before = 0: these are the accelerations at its start). Changes of acceleration below `noise` are
+/// rounding. Collective.
+template <int D>
+LocalError local_error(const System<D>& system, Positions<D> a, Positions<D> a_before, double h, double h_before,
+                       double noise) {
+  const auto& p = system.particles;
+  const double distance = mean_distance(system);
+  double most = 0;  // of |a − a⁻|²/length²
+  Id worst = 0;
+  for (Id i = 0; i < p.size(); ++i) {
+    if (!p.owns(i)) continue;
+    const double length = length_of_error(p.radius[i], distance);
+    const double change = (a[i] - a_before[i]).squaredNorm();
+    if (change <= noise * noise || change <= most * length * length) continue;
+    most = change / (length * length);
+    worst = i;
+  }
+  const double all = system.decomposition.largest(most);
+  LocalError error{.rate = std::sqrt(all) / (6 * (h + h_before))};
+  constexpr double kNone = -std::numeric_limits<double>::infinity();
+  if (all > 0)  // the smallest id of the worst particles
+    error.id =
+        static_cast<Id>(-system.decomposition.largest(most == all ? -static_cast<double>(p.id_of(worst)) : kNone));
+  return error;
+}
+
+/// A local error may be this many times the accuracy asked for, or the step is repeated: it is twice too long then.
+inline constexpr double kMostError = 8;
+
+/// Throws StepTooLong if a slab of this length is not accurate enough; `error` is of a piece of the length `piece`.
+inline void need_accuracy(const LocalError& error, double accuracy, double piece, double length) {
+  if (accuracy > 0 && !(error.of(piece) <= kMostError * accuracy)) throw StepTooLong{0.5 * length, error.id};
+}
+
+}  // namespace carom
