@@ -22,7 +22,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -50,7 +49,7 @@ constexpr int kSwapsBeforeFreezing = 3;   // a particle is frozen at the next sw
 constexpr double kFrequencyMargin = 1.1;  // for frequencies above the estimate
 constexpr std::int64_t kStepsPerFrequency = 1000;  // steps for which the estimate is used
 /// Of a sphere in a slab: the cost of a unit of time is least there, in the Yukawa fluid (README.md).
-const double kMostContacts = std::getenv("MC") ? std::atof(std::getenv("MC")) : 0.5;
+constexpr double kMostContacts = 0.5;
 constexpr std::int64_t kStepsPerEstimate = 16;  // steps of fixed length for one estimate of the local error
 constexpr double kMostFolded = 0.1;             // of the kinetic energy
 // The rounding of positions changes the energy by this fraction of Σ |F| |x|, in any method.
@@ -97,6 +96,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
     report_ = &report;
+    most_contacts_ = slab.most_contacts;
     step_ = slab.index;
     if (!system.box.contacts.elastic()) set_scales(system);
     watch_ = report.watch;
@@ -232,6 +232,9 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       end_ = core_->fly(a_);
       sweeps_ = control.sweep() + 1;
       if (!end_.complete) return false;
+      if (const auto contacts = static_cast<double>(core_->all_contacts());
+          contacts > most_contacts_ && control.sweep() == 0)
+        throw StepTooLong{.length = h * 0.5 * most_contacts_ / contacts};
       const auto [squared, swaps] = evaluate(system, h, control.sweep() == 0);
       const double largest = h * std::sqrt(squared);
       if (!std::isfinite(largest) || !held_) return false;
@@ -456,6 +459,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   std::vector<Vec<D>> move_;  // change of a_ in the last sweep
   Counters* counters_ = nullptr;
   SlabReport<D>* report_ = nullptr;
+  double most_contacts_ = 0;
   SlabWatch* watch_ = nullptr;
 };
 

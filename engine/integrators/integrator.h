@@ -26,6 +26,8 @@ struct Slab {
   std::int64_t steps = 1;  ///< in this length; more than one in epochs of free flight, and with longest_step
   bool ends_step = true;   ///< false: a part of a step, which another slab goes on with
   double accuracy = 0;     ///< Plan::accuracy
+  /// StepTooLong if there are more contacts (of two spheres: two).
+  double most_contacts = std::numeric_limits<double>::infinity();
   /// Free flight stops at this many pair collisions (counted by Counters::sphere_sphere from the start of the run).
   std::uint64_t collision_limit = std::numeric_limits<std::uint64_t>::max();
   /// Free flight stops at this many contacts in the slab, those with walls and the kicks of a bath included.

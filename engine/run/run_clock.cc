@@ -21,6 +21,13 @@ constexpr double kLongestEpoch = 1e9;
 /// has more in a slab, of the last slab.
 constexpr double kContactsOfRate = 64;
 
+/// Fewer contacts in a slab cost nothing that matters, however few spheres have them.
+constexpr double kFewContacts = 32;
+
+/// A slab is repeated if it has this many times the contacts that are wanted; its first flight is lost then. A slab is
+/// not repeated if it is only this part of a step: contacts that repeat without end are an error of their own.
+constexpr double kTooMany = 2, kShortestPart = 0x1p-10;
+
 /// The largest change of the length from slab to slab: an acceleration that happens not to change says nothing about
 /// the next step.
 constexpr double kMostGrowth = 2, kMostShrinkage = 0.25;
@@ -72,6 +79,7 @@ Slab RunClock::next_slab(const Statistics& s) const {
       slab.steps == 1 ? length_from(time_after(slab.index)) : static_cast<double>(slab.steps) * plan_.step;
   slab.length = length - count.within;
   slab.accuracy = plan_.accuracy;
+  if (slab.length > kShortestPart * plan_.step) slab.most_contacts = kTooMany * most_contacts_;
   if (const double parts = std::ceil((1 - 1e-9) * slab.length / pace.length);
       pace.length > 0 && !adapts() && parts > 1) {
     slab.length /= parts;
@@ -153,27 +161,37 @@ void RunClock::lengthen(double steps) {
   count.boxes = 0;
 }
 
-void RunClock::adapt(const Slab& slab, const LocalError& error, std::uint64_t contacts, const SlabLimits& limits) {
+void RunClock::expect(double most_contacts, double contacts, double longest) {
+  most_contacts_ = std::max(most_contacts * particles_, kFewContacts);
+  pace = {.contacts = kContactsOfRate, .time = kContactsOfRate / (particles_ * contacts)};
+  const double length = std::min(length_with_contacts(), longest);
+  pace.length = std::isfinite(length) ? length : 0;
+}
+
+/// The length of a slab with as many contacts as are wanted; infinite without contacts.
+double RunClock::length_with_contacts() const { return most_contacts_ * (pace.time / pace.contacts); }
+
+void RunClock::adapt(const Slab& slab, const LocalError& error, std::uint64_t contacts, double longest) {
   const auto happened = static_cast<double>(contacts);
   const double kept = std::min(1.0, kContactsOfRate / (pace.contacts + happened));
   pace.contacts = kept * pace.contacts + happened;
   pace.time = kept * pace.time + slab.length;
-  double length = limits.contacts * particles_ * (pace.time / pace.contacts);  // infinite without contacts
+  double length = length_with_contacts();
   if (!adapts()) {
     pace.length = std::isfinite(length) ? length : 0;
     return;
   }
   whole_ = !(slab.length < pace.length);
   if (error.rate > 0) length = std::min(length, elementary::cbrt(plan_.accuracy / error.rate));
-  length = std::min(std::clamp(length, kMostShrinkage * pace.length, kMostGrowth * pace.length), limits.length);
+  length = std::min(std::clamp(length, kMostShrinkage * pace.length, kMostGrowth * pace.length), longest);
   pace.length = std::max(rounded_down(length), plan_.shortest_step);
 }
 
 void RunClock::shorten(const Slab& slab, const StepTooLong& wanted) {
-  const double length = std::max(wanted.length, plan_.shortest_step);
+  const double length = wanted.id ? std::max(wanted.length, plan_.shortest_step) : wanted.length;
   if (!(length < slab.length) || !(slab.start + length > slab.start))
     throw Error(Failure::numerical, "a step of " + short_text(slab.length) + " changes the acceleration of particle " +
-                                        std::to_string(wanted.id) + " too much for an accuracy of " +
+                                        std::to_string(wanted.id.value_or(0)) + " too much for an accuracy of " +
                                         short_text(plan_.accuracy) +
                                         (length < slab.length ? ", and a shorter one does not change the time; give a "
                                                                 "larger integrator.accuracy"

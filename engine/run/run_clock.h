@@ -41,12 +41,6 @@ struct Pace {
   double contacts = 0, time = 0;
 };
 
-/// The limits of slabs.
-struct SlabLimits {
-  double contacts = std::numeric_limits<double>::infinity();  ///< of a sphere
-  double length = std::numeric_limits<double>::infinity();    ///< [time]
-};
-
 class RunClock {
  public:
   /// `plan` must outlive the clock; its end may change. `stepping`: IntegratorInfo::stepping.
@@ -74,10 +68,13 @@ class RunClock {
   double most_steps() const;
   /// Sets the number of steps of the next epoch. Call when one is complete.
   void lengthen(double steps);
+  /// For methods that adapt: the number of contacts of a sphere in a slab that is wanted (infinite: any), the number in
+  /// a unit of time that is expected before any are known, and the longest first step [time].
+  void expect(double most_contacts, double contacts, double longest);
   /// Sets the length of the next slabs after a complete one with this local error and number of contacts (of two
   /// spheres: two).
-  void adapt(const Slab& slab, const LocalError& error, std::uint64_t contacts, const SlabLimits& limits);
-  /// Makes the slab shorter that was not accurate enough and will be repeated. Throws Error if it would be too short.
+  void adapt(const Slab& slab, const LocalError& error, std::uint64_t contacts, double longest);
+  /// Makes the slab shorter that was too long and will be repeated. Throws Error if it would be too short.
   void shorten(const Slab& slab, const StepTooLong& wanted);
   /// Whether each step has a length of its own.
   bool adapts() const;
@@ -90,10 +87,12 @@ class RunClock {
 
  private:
   double step() const;
+  double length_with_contacts() const;
 
   const Plan& plan_;
   bool stepping_;
   double particles_;
+  double most_contacts_ = std::numeric_limits<double>::infinity();  // in a slab
   bool whole_ = true;                             // with Plan::accuracy: the end did not shorten the last slab
   std::uint64_t most_collisions_;                 // per slab of an epoch
   std::optional<std::uint64_t> last_collisions_;  // in the last slab, if this run has executed one

@@ -30,6 +30,7 @@ constexpr double kMostCells = 0x1p52;
 constexpr double kMostOscillations = 1e9;
 /// Flight distance without any pair collision after which a run in an open box ends [longest edge].
 constexpr double kFarApart = 1e4;
+constexpr double kNever = std::numeric_limits<double>::infinity();
 /// Plan::accuracy if no step is given.
 constexpr double kDefaultAccuracy = 1e-4;
 /// Plan::step if no particle moves at the start and no step is given, relative to the end of the run. The forces at the
@@ -254,6 +255,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
       throw Error(Failure::deck, "all particles are fixed and nothing would move; give some a finite mass");
     check_forces(*system_, info_);
     if (!hooks.restore) check_rest_speeds(*system_);
+    const double contacts = info_.adapts ? contact_rate(*system_) : 0;
     if (info_.smooth_forces) {
       system_->quanta = quanta(*system_);
       s.counters.divisions += divide();
@@ -262,7 +264,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
     if (!hooks.branch) make_monitor();
     first_of_integrator_ = system_->fields.of_run().size();
     integrator_->start(*system_, s.counters);
-    if (clock_.adapts()) clock_.pace.length = first_step();
+    if (info_.adapts) clock_.expect(info_.most_contacts, contacts, clock_.adapts() ? first_step() : kNever);
   }
   if (again || hooks.restore) {
     decomposition.to_blocks();
@@ -292,7 +294,7 @@ void Simulation<D>::run(const Hooks& hooks) {
   Statistics& s = statistics_;
   begin(hooks);
   set_ramp();
-  SlabWatch watch(system_->fields, first_of_integrator_, clock_.adapts(), hooks.leave, hooks.leave_here);
+  SlabWatch watch(system_->fields, first_of_integrator_, info_.adapts, hooks.leave, hooks.leave_here);
   const double seconds_before = s.wall_seconds;
   const auto take_time = [&] {
     const auto elapsed = std::chrono::steady_clock::now() - clock_start;
@@ -392,7 +394,7 @@ bool Simulation<D>::fly(Slab& slab, SlabReport<D>& report, SlabWatch& watch) {
       if (report.contacts) report.contacts->clear();
     } catch (const StepTooLong& wanted) {
       watch.restore();
-      ++before.steps_rejected;
+      ++(clock_.adapts() ? before.steps_rejected : before.slabs_halved);
       report.counters = before;
       report.error = {};
       if (report.contacts) report.contacts->clear();
@@ -458,8 +460,7 @@ template <int D>
 double Simulation<D>::longest_step() const {
   constexpr double kOfRelaxation = 0.1;
   const Bath& bath = system_->box.bath;
-  double longest = std::min(system_->box.longest_step(),
-                            plan_.longest_step > 0 ? plan_.longest_step : std::numeric_limits<double>::infinity());
+  double longest = std::min(system_->box.longest_step(), plan_.longest_step > 0 ? plan_.longest_step : kNever);
   if (bath.type != Bath::Type::none && bath.rate > 0) longest = std::min(longest, kOfRelaxation / bath.rate);
   return longest;
 }
@@ -477,7 +478,7 @@ void Simulation<D>::adapt(const Slab& slab, const SlabReport<D>& report, std::ui
     s.shortest_step = s.shortest_step > 0 ? std::min(s.shortest_step, complete) : complete;
     s.longest_step = std::max(s.longest_step, complete);
   }
-  clock_.adapt(slab, report.error, contacts, {info_.most_contacts, longest_step()});
+  clock_.adapt(slab, report.error, contacts, longest_step());
 }
 
 /// Sets the times of a ramp of the bath's temperature, unless they are given or an earlier plan has set them.

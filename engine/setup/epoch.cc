@@ -29,10 +29,18 @@ constexpr double kFarthestInBoxes = 4;
 constexpr double kFaster = 4;
 /// The longest epoch, relative to the last one.
 constexpr double kLonger = 64;
-}  // namespace
+
+/// The speeds of a gas: sums over all particles, and what they would be in equilibrium.
+template <int D>
+struct Gas {
+  double thermal_speed = 0;    ///< √(Σ m v²/(D Σ m)); 0 if nothing moves
+  double light_speed = 0;      ///< the thermal speed of the lightest particles, in equilibrium
+  double fastest = 0;          ///< |v|
+  double contacts_a_time = 0;  ///< of a sphere
+};
 
 template <int D>
-double default_epoch(const System<D>& system) {
+Gas<D> gas_of(const System<D>& system) {
   const auto& p = system.particles;
   const auto n = static_cast<double>(system.size());
   struct Sums {
@@ -54,12 +62,28 @@ double default_epoch(const System<D>& system) {
   const bool heated = bath.type != Bath::Type::none;
   const double hottest = heated ? std::max(bath.temperature, bath.last_temperature) : 0;
   const double twice_kinetic = std::max(at_start, D * n * hottest);
-  if (twice_kinetic == 0 || mass == 0) return 1;
+  if (twice_kinetic == 0 || mass == 0) return {};
   const double thermal_speed = std::sqrt(twice_kinetic / (D * n * mass));
-  const double rate = thermal_speed * contacts_a_length({D, n / system.box.volume(), filled, diameter, diameter});
+  return {
+      .thermal_speed = thermal_speed,
+      // In equilibrium, where the lightest are the fastest.
+      .light_speed = std::sqrt(twice_kinetic / (D * n * lightest)),
+      .fastest = fastest,
+      .contacts_a_time = thermal_speed * contacts_a_length({D, n / system.box.volume(), filled, diameter, diameter})};
+}
+}  // namespace
+
+template <int D>
+double contact_rate(const System<D>& system) {
+  return gas_of(system).contacts_a_time;
+}
+
+template <int D>
+double default_epoch(const System<D>& system) {
+  const auto [thermal_speed, light_speed, fastest, rate] = gas_of(system);
+  if (thermal_speed == 0) return 1;
+  const Bath& bath = system.box.bath;
   const double farthest = kFarthestInBoxes * system.box.edges.maxCoeff();
-  // In equilibrium, where the lightest are the fastest.
-  const double light_speed = std::sqrt(twice_kinetic / (D * n * lightest));
   double epoch = std::min(kEventsOfEpoch / rate, farthest / std::max(thermal_speed, light_speed));
   if (bath.rescales()) epoch = std::min(epoch, kEpochOfRelaxation / bath.rate);
   // The images of the fastest particles, also in equilibrium, must fit into a candidate on any number of ranks.
@@ -117,6 +141,8 @@ double next_epoch(const System<D>& system, const PastEpoch& past) {
   return longest;
 }
 
+template double contact_rate(const System<2>&);
+template double contact_rate(const System<3>&);
 template double default_epoch(const System<2>&);
 template double default_epoch(const System<3>&);
 template void choose_epoch(const System<2>&, Parameters&, double);

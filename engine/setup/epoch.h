@@ -7,6 +7,11 @@
 
 namespace carom {
 
+/// The contacts of a sphere with others in a unit of time in equilibrium at this density and temperature, that of the
+/// bath if it is higher (Enskog's theory); 0 if nothing moves. Collective; the particles must be in blocks of ids.
+template <int D>
+double contact_rate(const System<D>& system);
+
 /// Forty mean free times of the fluid at this density (Enskog's theory), but at most the time in which the lightest
 /// spheres move four times the longest edge in equilibrium, and less if light or fast ones could cross more boxes than
 /// can be counted; rounded to two digits; 1 if nothing moves. Longer epochs lose digits, because times and unwrapped

@@ -16,6 +16,7 @@
 // unchanged then.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -70,9 +71,12 @@ class SlabCore {
   const std::vector<Vec<D>>& v() const { return v_; }            ///< velocities there [length/time]
   /// Whether a particle's end point differs from that of the flight before; and their number on all ranks.
   const std::vector<char>& moved() const { return moved_; }
-  std::uint64_t all_moved() const { return all_moved_; }
+  std::uint64_t all_moved() const { return counts_[0]; }
   /// The contacts of the last flight, in the order of their keys.
   std::span<const Contact<D>> contacts() const { return contacts_; }
+
+  /// Their number on all ranks; contacts of two spheres count twice.
+  std::uint64_t all_contacts() const { return counts_[1]; }
 
   /// Whether particle i has a contact in the last flight.
   bool collides(Id i) const { return slot_[i] != 0; }
@@ -126,6 +130,9 @@ class SlabCore {
   void predict_pair(Id i, Id j, const Image<D>& image);
   void predict_walls(Id i);
   void predict_all(Id i);
+  void predict_both(const EventKey<D>& key);
+  template <class F>
+  void timed(double& total, F&& work);
   bool comes_to_rest(const EventKey<D>& key) const;
   bool at_the_end(const EventKey<D>& key) const;
   bool falls_back(const EventKey<D>& key);
@@ -173,8 +180,8 @@ class SlabCore {
   std::vector<char> held_;               // by particle: has a resting contact; empty: none has
   std::vector<Vec<D>> x_, last_x_, v_;
   std::vector<char> moved_;
-  std::uint64_t all_moved_ = 0;
-  std::vector<std::uint32_t> slot_;  // by particle: 1 + its index in flights_, or 0
+  std::array<std::uint64_t, 2> counts_{};  // all_moved(), all_contacts()
+  std::vector<std::uint32_t> slot_;        // by particle: 1 + its index in flights_, or 0
   std::vector<Flight> flights_;
   std::vector<Planned> queue_;  // a heap
   std::vector<Contact<D>> contacts_;

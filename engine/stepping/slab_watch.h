@@ -9,6 +9,7 @@
 
 #include <cstring>
 #include <functional>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -28,10 +29,11 @@ struct LocalError {
   double of(double length) const { return rate * length * length * length; }
 };
 
-/// Thrown on all ranks together: the slab is not accurate enough, and is repeated with this length.
+/// Thrown on all ranks together: the slab is not accurate enough, or has too many contacts, and is repeated with this
+/// length.
 struct StepTooLong {
   double length = 0;
-  Id id = 0;  ///< the particle with the largest error
+  std::optional<Id> id{};  ///< the particle with the largest error, if this is the reason
 };
 
 class SlabWatch {
