@@ -233,8 +233,10 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       sweeps_ = control.sweep() + 1;
       if (!end_.complete) return false;
       if (const auto contacts = static_cast<double>(core_->all_contacts());
-          contacts > most_contacts_ && control.sweep() == 0)
+          contacts > most_contacts_ && control.sweep() == 0) {
+        core_->scan().list().drop();  // it has far too many pairs for a shorter slab
         throw StepTooLong{.length = h * 0.5 * most_contacts_ / contacts};
+      }
       const auto [squared, swaps] = evaluate(system, h, control.sweep() == 0);
       const double largest = h * std::sqrt(squared);
       if (!std::isfinite(largest) || !held_) return false;

@@ -39,6 +39,11 @@ class NeighbourList {
   std::span<const NeighbourPair<D>> cover(std::span<const Vec<D>> x, std::span<const Vec<D>> x_new, double margin = 0);
   std::span<const NeighbourPair<D>> cover(std::span<const Vec<D>> x, double margin = 0) { return cover(x, x, margin); }
 
+  /// Forgets the list, which was made for longer steps than those to come.
+  void drop() {
+    built_at_.clear();
+    skin_.begin(0);
+  }
   /// The partners of each particle in the pairs that cover() returned last, with the indices of the pairs.
   const Partners& partners();
 
