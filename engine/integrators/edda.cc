@@ -492,7 +492,7 @@ IntegratorInfo edda() {
           "force pass and the collisions. Energy is exact whatever the step and the number of collisions.",
       .source =
           "this project; relatives: LaBudde, Greenspan, Numer. Math. 25 (1976) 323; Gonzalez, J. Nonlinear Sci. "
-          "6 (1996) 449; Gonzalez, Schmidt, Ortiz, Int. J. Numer. Methods Eng. 84 (2010) 1085",
+          "6 (1996) 449; Gonzalez, Schmidt, Ortiz, Int. J. Numer. Methods Eng. 82 (2010) 205 and 84 (2010) 1407",
       .exact = true,
       .local = true,
       .adapts = true,
