@@ -163,19 +163,24 @@ void RunClock::lengthen(double steps) {
 
 void RunClock::expect(double most_contacts, double contacts, double longest) {
   most_contacts_ = std::max(most_contacts * particles_, kFewContacts);
-  pace = {.contacts = kContactsOfRate, .time = kContactsOfRate / (particles_ * contacts)};
+  pace = {.expected = contacts, .before = particles_};
   const double length = std::min(length_with_contacts(), longest);
   pace.length = std::isfinite(length) ? length : 0;
 }
 
-/// The length of a slab with as many contacts as are wanted; infinite without contacts.
-double RunClock::length_with_contacts() const { return most_contacts_ * (pace.time / pace.contacts); }
+/// The length of a slab with as many contacts as are wanted; infinite without contacts. In a crystal that melts, the
+/// first slabs have few.
+double RunClock::length_with_contacts() const {
+  const double rate = pace.time > 0 ? pace.contacts / pace.time : 0;
+  return most_contacts_ / std::max(rate, particles_ * pace.expected);
+}
 
 void RunClock::adapt(const Slab& slab, const LocalError& error, std::uint64_t contacts, double longest) {
   const auto happened = static_cast<double>(contacts);
   const double kept = std::min(1.0, kContactsOfRate / (pace.contacts + happened));
   pace.contacts = kept * pace.contacts + happened;
   pace.time = kept * pace.time + slab.length;
+  if (pace.before -= happened; pace.before <= 0) pace.expected = pace.before = 0;
   double length = length_with_contacts();
   if (!adapts()) {
     pace.length = std::isfinite(length) ? length : 0;
