@@ -294,7 +294,7 @@ void Simulation<D>::run(const Hooks& hooks) {
   Statistics& s = statistics_;
   begin(hooks);
   set_ramp();
-  SlabWatch watch(system_->fields, first_of_integrator_, info_.adapts, hooks.leave, hooks.leave_here);
+  SlabWatch watch(system_->fields, first_of_integrator_, hooks.leave, hooks.leave_here, info_.adapts);
   const double seconds_before = s.wall_seconds;
   const auto take_time = [&] {
     const auto elapsed = std::chrono::steady_clock::now() - clock_start;

@@ -41,13 +41,13 @@ class SlabWatch {
   /// `leave` says whether to abandon the slab; it is called now and then and is collective. `leave_here` is the request
   /// of this rank alone. `repeats`: a slab may be repeated after StepTooLong. The integrator's entries in the registry
   /// of run state begin at `first`.
-  SlabWatch(Fields& fields, std::size_t first, bool repeats, std::function<bool()> leave,
-            std::function<bool()> leave_here)
+  SlabWatch(Fields& fields, std::size_t first, std::function<bool()> leave, std::function<bool()> leave_here,
+            bool repeats = false)
       : fields_(fields),
         first_(first),
-        repeats_(repeats),
         leave_(std::move(leave)),
-        leave_here_(std::move(leave_here)) {}
+        leave_here_(std::move(leave_here)),
+        repeats_(repeats) {}
 
   // Functions that integrators call.
 
@@ -104,8 +104,8 @@ class SlabWatch {
 
   Fields& fields_;
   std::size_t first_;
-  bool repeats_;
   std::function<bool()> leave_, leave_here_;
+  bool repeats_;
   bool kept_ = false;
   std::vector<Bytes> of_particles_, of_run_;
 };

@@ -11,6 +11,7 @@
 #include "io/deck/memory.h"
 #include "io/deck/schema.h"
 #include "io/deck/validate_state.h"
+#include "io/files/log_report.h"
 #include "io/files/version.h"
 
 namespace carom {
@@ -30,7 +31,8 @@ std::string end_text(const Plan& plan) {
   if (plan.steps) part(std::to_string(*plan.steps) + " steps");
   if (plan.end_time) {
     std::ostringstream time;
-    time << "time " << *plan.end_time << " (" << std::ceil(*plan.end_time / plan.step * (1 - 1e-12)) << " steps)";
+    time << "time " << *plan.end_time;
+    if (plan.accuracy == 0) time << " (" << std::ceil(*plan.end_time / plan.step * (1 - 1e-12)) << " steps)";
     part(time.str());
   }
   if (plan.collisions) part(std::to_string(*plan.collisions) + " collisions");
@@ -52,7 +54,7 @@ int describe(Deck& deck) {
   if (system->box.closed())
     std::cout << "packing fraction  " << packing_fraction<D>(system->box.volume(), p.radius) << '\n';
   std::cout << "interactions      " << system->interactions.size() << '\n';
-  std::cout << "integrator        " << deck.integrator << ", step " << deck.plan.step << '\n';
+  std::cout << "integrator        " << deck.integrator << ", " << steps_text(deck.plan) << '\n';
   std::cout << "ends at           " << end_text(deck.plan) << '\n';
   std::cout << "output            " << deck.output.directory.string() << '\n';
   const double memory = estimated_memory(*deck.source, &system->box);

@@ -184,7 +184,9 @@ void warn_of_state(const Deck& deck, System<D>& system, Problems& problems) {
       problems.warning(source.interactions[k].at, caution.what, caution.remedy);
 
   constexpr std::uint64_t affordable = 500'000;  // particles or pairs: below a second of work
-  if (!source.integrator->stepping || system.interactions.empty() || system.size() > affordable) return;
+  if (!source.integrator->stepping || deck.plan.accuracy > 0 || system.interactions.empty() ||
+      system.size() > affordable)
+    return;
   system.quanta = quanta(system);
   system.decomposition.divide(true, deck.plan.step);
   std::uint64_t pairs = 0;

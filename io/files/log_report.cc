@@ -120,6 +120,11 @@ std::string missing_errors_text(const Statistics& s) {
 
 }  // namespace
 
+std::string steps_text(const Plan& plan) {
+  return plan.accuracy > 0 ? fmt::format("steps of its own for an accuracy of {:g}", plan.accuracy)
+                           : fmt::format("step {:g}", plan.step);
+}
+
 std::string banner_text(const Deck& deck, std::size_t particles, int ranks) {
   return fmt::format(
       "carom {}\n"
@@ -127,11 +132,11 @@ std::string banner_text(const Deck& deck, std::size_t particles, int ranks) {
       "{}\n"
       "host {}, process {}, {}\n"
       "deck {}{}\n"
-      "{} particles in {}-D, integrator {}, step {:g}, until {}\n"
+      "{} particles in {}-D, integrator {}, {}, until {}\n"
       "output in {}",
       version_string(), compiler_string(), library_versions(), host_name(), getpid(),
       ranks == 1 ? "1 rank" : fmt::format("{} ranks", ranks), deck.file.string(),
-      deck.title.empty() ? "" : ": " + deck.title, particles, deck.dimension, deck.integrator, deck.plan.step,
+      deck.title.empty() ? "" : ": " + deck.title, particles, deck.dimension, deck.integrator, steps_text(deck.plan),
       ends_at(deck.plan), deck.output.directory.string());
 }
 
@@ -162,11 +167,29 @@ std::optional<std::string> overlap_warning(const Statistics& s, const Box<D>& bo
       overlap_text(*s.overlap, box), s.overlap->time);
 }
 
+std::optional<std::string> accuracy_warning(const Statistics& s, const IntegratorInfo& method) {
+  constexpr double kLargestError = 1e-2;
+  if (!method.adapts || !(s.local_error > kLargestError)) return {};
+  return fmt::format(
+      "warning: the steps are long: about time {:g}, one of them left the position of particle {} wrong by {:.2g} of "
+      "its "
+      "diameter, which the exact energy does not show; use a smaller integrator.step, or leave it out",
+      s.local_error_time, s.local_error_id, s.local_error);
+}
+
+template <int D>
+std::vector<std::string> warnings_about(const Statistics& s, const IntegratorInfo& method, const Box<D>& box) {
+  std::vector<std::string> all;
+  for (auto& warning : {overlap_warning(s, box), energy_warning(s, method), accuracy_warning(s, method)})
+    if (warning) all.push_back(*warning);
+  return all;
+}
+template std::vector<std::string> warnings_about(const Statistics&, const IntegratorInfo&, const Box<2>&);
+template std::vector<std::string> warnings_about(const Statistics&, const IntegratorInfo&, const Box<3>&);
+
 template <int D>
 std::vector<std::string> warnings_about(const Deck& deck, const Statistics& s, const Box<D>& box) {
-  std::vector<std::string> all;
-  if (auto warning = overlap_warning(s, box)) all.push_back(std::move(*warning));
-  if (auto warning = energy_warning(s, find_integrator(deck.integrator))) all.push_back(std::move(*warning));
+  std::vector<std::string> all = warnings_about(s, find_integrator(deck.integrator), box);
   if (deck.plan.from_equilibrium && !s.equilibrium)
     all.emplace_back(
         "warning: the initial transient has not ended, so nothing was sampled, and the means of the summary are of the "
@@ -196,6 +219,9 @@ std::string report_text(const Deck& deck, const Statistics& s, std::span<const R
   if (s.mean_free_time)
     text += fmt::format("\nmean free time {:.6g}, mean free path {:.6g}", *s.mean_free_time, *s.mean_free_path);
   text += missing_errors_text(s);
+  if (deck.plan.accuracy > 0 && s.longest_step > 0)
+    text += fmt::format("\nsteps from {:.3g} to {:.3g} long, {} repeated with shorter ones", s.shortest_step,
+                        s.longest_step, c.steps_rejected);
   if (s.force_passes > 0)
     text += fmt::format("\n{:.6g} force passes, {} sweeps, {} steps halved, {} fallbacks", s.force_passes, c.sweeps,
                         c.slabs_halved, c.fallbacks);

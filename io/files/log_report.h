@@ -16,17 +16,25 @@
 
 namespace carom {
 
+/// "step 0.01", or that the method chooses its steps.
+std::string steps_text(const Plan& plan);
 /// Version, libraries, host, deck and method of a run. `particles`: their number; `ranks`: of MPI.
 std::string banner_text(const Deck& deck, std::size_t particles, int ranks);
 
 /// A warning if the energy error exceeds the energy itself (the step is far too long), or 1e-12 of it with an exact
 /// method.
 std::optional<std::string> energy_warning(const Statistics& statistics, const IntegratorInfo& method);
+/// Warns of steps that were so long that positions were wrong by a hundredth of a diameter in one of them: where the
+/// energy is exact at any step, it does not tell.
+std::optional<std::string> accuracy_warning(const Statistics& statistics, const IntegratorInfo& method);
 /// A warning if spheres overlapped by more than rounding, in the run so far.
 template <int D>
 std::optional<std::string> overlap_warning(const Statistics& statistics, const Box<D>& box);
-/// All warnings at the end of a run: these two, and if no end of the initial transient was found that means were to
-/// begin at.
+/// These three warnings, as far as they apply.
+template <int D>
+std::vector<std::string> warnings_about(const Statistics& statistics, const IntegratorInfo& method, const Box<D>& box);
+/// All warnings at the end of a run: these, and if no end of the initial transient was found that means were to begin
+/// at.
 template <int D>
 std::vector<std::string> warnings_about(const Deck& deck, const Statistics& statistics, const Box<D>& box);
 

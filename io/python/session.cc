@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 
 #include "engine/forces/add_interaction.h"
 #include "engine/laws/bath_options.h"
@@ -12,6 +13,7 @@
 #include "engine/run/measurement.h"
 #include "engine/run/state.h"
 #include "engine/setup/epoch.h"
+#include "io/files/log_report.h"
 
 namespace carom::python {
 namespace {
@@ -460,8 +462,8 @@ void Session<D>::run(Plan plan, const RunHooks& hooks) {
     warnings_ = deck_warnings_;
     if (record_)
       warnings_.insert(warnings_.end(), record_->warnings().begin(), record_->warnings().end());
-    else if (const auto overlap = overlap_warning(*live_, box_))
-      warnings_.push_back(*overlap);
+    else
+      std::ranges::move(warnings_about(*live_, *integrator(), box_), std::back_inserter(warnings_));
     if (started) {
       statistics_ = *live_;
       if (shot_ && std::abs(shot_->time - statistics_.end_time) <= 1e-9 * step_) shot_->time = statistics_.end_time;
