@@ -58,13 +58,17 @@ WIDTHS = [width for width, flag in (("sse2", "sse2"), ("avx2", "avx2"), ("avx512
           if flag in pathlib.Path("/proc/cpuinfo").read_text().split()]
 
 
-@pytest.mark.parametrize("method, bath", [(method, "andersen") for method in ("free-flight", "psa", "edda", "cva", "mcva", "cdda")] +
-                         [(method, "rescaling") for method in ("free-flight", "psa", "edda")])
-def test_every_law_on_ranks_at_all_vector_widths_and_after_a_kill(method, bath, killer, tmp_path):
+@pytest.mark.parametrize("method, bath, accuracy",
+                         [(method, "andersen", 0) for method in ("free-flight", "psa", "edda", "cva", "mcva", "cdda")] +
+                         [(method, "rescaling", 0) for method in ("free-flight", "psa", "edda")] +
+                         [("edda", "rescaling", 1e-4), ("cdda", "andersen", 1e-4)])
+def test_every_law_on_ranks_at_all_vector_widths_and_after_a_kill(method, bath, accuracy, killer, tmp_path):
     heated = LAWS | {"bath": [{"type": bath, "temperature": [1.0, 2.0], "rate": 0.5}]}
     deck, plain, killed = write_deck(tmp_path, toml_text(heated)), tmp_path / "plain", tmp_path / "killed"
     output = ["output.events=true", "output.checkpoint_wall=\"0\"", f"integrator.type={method}",
               "integrator.step=" + ("0.25" if method == "free-flight" else "0.02")]
+    if accuracy:
+        output.append(f"integrator.accuracy={accuracy}")
     run(deck, plain, output)
     energy = summary(plain)["energy"]
     assert energy["dissipated"] > 1 and abs(energy["work"]) > 1 and abs(energy["heat"]) > 1 and energy["rotational"] > 1
@@ -195,7 +199,7 @@ def test_an_equilibrated_run_on_ranks_and_after_a_kill(method, killer, tmp_path)
     output = ["particles.0.count=108", "output.start=\"equilibrated\"", "output.frame_interval=0",
               "output.rdf_interval=0.1", "output.sk_interval=0.2", "output.sk_bins=5", "output.checkpoint_wall=\"0\"",
               "output.transport_interval=0.08", "output.pressure_tensor_interval=0.05",
-              *(["integrator.step=0.04", "run.end_time=5.6", "output.thermo_interval=0.04", "interaction.0.cutoff=2.0"] if method == "edda"
+              *(["integrator.step=0.03", "run.end_time=5.6", "output.thermo_interval=0.04", "interaction.0.cutoff=2.0"] if method == "edda"
                 else ["integrator.step=0.2", "output.thermo_interval=0.03", "run.end_time=6"])]
     run(deck, plain, output)
     found = summary(plain)["equilibration"]

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "engine/run/simulation.h"
 
 namespace carom::run_clock_test {
@@ -103,6 +105,68 @@ TEST(RunClock, TheNearestEndSaysHowMuchIsDone) {
   run.slab();
   run.slab();
   EXPECT_EQ(run.clock.fraction_done(run.s), 0.2);
+}
+
+/// A clock of a method that adapts.
+struct Stroll : Journey {
+  explicit Stroll(const Plan& wanted, double most_contacts = kNever, double contacts = 0) : Journey{wanted} {
+    clock.expect(most_contacts, contacts, wanted.accuracy > 0 ? 0.1 : kNever);
+  }
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+  double step(double rate, std::uint64_t contacts = 0) {
+    const Slab slab = Journey::slab();
+    clock.adapt(slab, {.rate = rate}, contacts, 10);
+    return slab.length;
+  }
+};
+
+TEST(RunClock, StepsFollowTheLocalErrorByAtMostAFactorOfTwoOrAQuarter) {
+  Stroll run({.step = 0.1, .end_time = 100, .accuracy = 1e-3});
+  EXPECT_EQ(run.step(1), 0.1);
+  EXPECT_EQ(run.step(1), 0x1.6a09e667f3bcdp-4);  // 2^(−3.5): the largest power of 2^(1/4) below 0.1
+  EXPECT_EQ(run.step(1e-6), run.clock.pace.length / 2);
+  EXPECT_EQ(run.step(1e9), run.clock.pace.length * 4);
+  run.step(0);
+  EXPECT_EQ(run.clock.pace.length, 0x1.6a09e667f3bcdp-4);
+  EXPECT_EQ(run.s.steps, 5);
+  for (int n = 0; n < 10; ++n) run.step(0);
+  EXPECT_EQ(run.clock.pace.length, 8);  // the largest power below the longest step, 10
+}
+
+TEST(RunClock, TheEndOfARunDoesNotChangeTheLengthOfTheNextStep) {
+  Stroll run({.step = 0.1, .end_time = 0.12, .accuracy = 1});
+  run.step(1000);
+  EXPECT_FALSE(run.clock.finished(run.s));
+  EXPECT_TRUE(run.clock.is_last_on_the_way(run.s));
+  const double before = run.clock.pace.length;
+  EXPECT_NEAR(run.step(1000), 0.02, 1e-15);
+  EXPECT_EQ(run.clock.pace.length, before);
+  EXPECT_EQ(run.s.end_time, 0.12);
+  EXPECT_TRUE(run.clock.finished(run.s));
+  EXPECT_FALSE(run.clock.is_last_on_the_way(run.s));
+}
+
+TEST(RunClock, AStepThatWasTooLongIsRepeatedWithALengthOfItsOwn) {
+  Stroll run({.step = 0.1, .end_time = 10, .accuracy = 1e-3, .shortest_step = 0.04});
+  run.clock.shorten(run.clock.next_slab(run.s), {.length = 0.05, .id = 3});
+  EXPECT_EQ(run.clock.next_slab(run.s).length, 0.05);
+  run.clock.shorten(run.clock.next_slab(run.s), {.length = 0.025, .id = 3});
+  EXPECT_EQ(run.clock.next_slab(run.s).length, 0.04);
+  EXPECT_THROW(run.clock.shorten(run.clock.next_slab(run.s), {.length = 0.02, .id = 3}), Error);
+}
+
+TEST(RunClock, FixedStepsAreDividedByTheNumberOfContacts) {
+  Stroll run({.step = 1, .steps = 3}, 10, 30);  // of each of ten particles
+  EXPECT_EQ(run.step(0, 9), 1.0 / 3);           // 300 are expected in a unit of time, 100 wanted
+  EXPECT_EQ(run.complete, 0);
+  EXPECT_EQ(run.step(0, 1), 1.0 / 3);  // still expected
+  EXPECT_EQ(run.s.steps, 0);
+  run.step(0, 60);
+  EXPECT_NEAR(run.complete, 1, 1e-15);
+  EXPECT_EQ(run.s.steps, 1);
+  EXPECT_EQ(run.s.end_time, 1);
+  EXPECT_EQ(run.step(0, 70), 1);  // 70 in a unit of time
+  EXPECT_EQ(run.s.steps, 2);
 }
 
 }  // namespace
