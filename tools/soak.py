@@ -8,6 +8,7 @@
     tools/soak.py --jumps tests/regression/decks/*.toml inputs/*.toml --count 50 --seed 3
     tools/soak.py --systems --count 1000
     tools/soak.py --systems cdda,psa,cva,mcva --count 1000 --only 17
+    tools/soak.py --systems --accuracy 1e-3 --count 300
 
 Each deck draws a method, forces, boundaries, a dimension, sizes and outputs. It runs once undisturbed, then again on other
 numbers of ranks, with checkpoints a few hundredths of a second apart, while it is killed (KILL to the process, a rank, or
@@ -188,6 +189,8 @@ def random_deck(dice, seconds):
     contacts = random_contacts(dice, boundary, walls, [each["name"] for each in particles]) if dissipates else []
     if any("tangential" in law for law in contacts) and dice.random() < 0.7:
         particles[0] |= {"rotational_temperature": dice.uniform(0, 2.0), "inertia": dice.uniform(0.1, 0.6)}
+    if method in ("cdda", "edda") and (dice.random() < 0.4):
+        integrator["accuracy"] = dice.choice([1e-2, 1e-3, 1e-4])
     return {"format": 1, "system": {"dimension": dimension, "boundary": boundary},
             "wall": walls, "contact": contacts, "bath": [bath] if bath else [], "particles": particles,
             "placement": {"type": lattice, "packing_fraction": packing, "seed": dice.randrange(1000)},
@@ -392,6 +395,9 @@ def run_system(carom, method, number, options):
     deck = random_system(random.Random(f"{options.seed} {number}"))
     if method != "edda":
         deck["integrator"] = {"type": method, "step": deck["integrator"]["step"]}
+    if options.accuracy and method in ("cdda", "edda"):
+        deck["integrator"]["accuracy"] = options.accuracy
+        del deck["integrator"]["step"]
     (where / "deck.toml").write_text(toml_text(deck))
     command = [str(carom), "run", str(where / "deck.toml"), "-o", str(where / "run"), "--quiet"]
     limit = (int(options.patience), int(options.patience) + 5)
@@ -452,6 +458,7 @@ def main(arguments=None):
     parser.add_argument("--seconds", type=float, default=0.4, help="about what a deck takes")
     parser.add_argument("--jumps", type=pathlib.Path, nargs="*", metavar="DECK", help="measure the largest jump of the energy in a slab")
     parser.add_argument("--systems", nargs="?", const="edda", metavar="METHODS", help="run hard systems by these methods; default: edda")
+    parser.add_argument("--accuracy", type=float, help="hard systems: edda and cdda choose their steps")
     parser.add_argument("--patience", type=float, default=60, help="processor time that a hard system may take [s]")
     parser.add_argument("--carom", help="the command; default: $CAROM or the build of tools/run")
     parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path("runs/soak"))

@@ -68,6 +68,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
       const double wanted = std::min(time_left, longest), tau = find_piece(p, wanted);
       if (tau == 0) {  // no convergence
         longest = 0.5 * wanted;
+        if (slab.accuracy > 0) throw StepTooLong{.length = 0.5 * slab.length, .id = 0};
         ++report.counters.slabs_halved;
         if (longest * kMostPieces < slab.length)
           throw Error(Failure::numerical,

@@ -168,6 +168,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         found_.touching = found_.touching || until_contact == kNever;
         continue;
       }
+      if (slab.accuracy > 0 && !resting() && !(end_.time > 0))
+        throw StepTooLong{.length = 0.5 * slab.length, .id = most_accelerated_id(system)};
       ++counters_->slabs_halved;
       longest = 0.5 * piece;
       found_.converged = 0;
@@ -187,7 +189,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       if (longest * kMostPieces < slab.length)
         throw Error(Failure::numerical, "the sweeps do not converge even in " + std::to_string(kMostPieces) +
                                             " pieces; the forces, strongest on particle " +
-                                            std::to_string(p.id_of(most_accelerated())) +
+                                            std::to_string(most_accelerated_id(system)) +
                                             ", are not finite or far too stiff for step = " + short_text(slab.length) +
                                             "; use a smaller integrator.step");
     }
@@ -305,9 +307,10 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         swaps_[i] = kSwapsBeforeFreezing + 1;
   }
 
-  Id most_accelerated() const {
+  /// Call this if all ranks have all particles.
+  Id most_accelerated_id(const System<D>& system) const {
     const auto most = std::ranges::max_element(a_, {}, [](const Vec<D>& a) { return finite(a.squaredNorm()); });
-    return static_cast<Id>(most - a_.begin());
+    return system.particles.id_of(static_cast<Id>(most - a_.begin()));
   }
 
   Vec<D> centre() const { return Vec<D>(scales_.centre.data()); }

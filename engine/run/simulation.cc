@@ -454,13 +454,19 @@ double Simulation<D>::first_step() {
   return std::max(length, plan_.shortest_step);
 }
 
-/// The longest step that the plan, the walls and the bath allow: a bath that acts at the ends of steps moves the
-/// kinetic energy by at most a tenth of its distance from the mean at once.
+/// The longest step that the plan, the walls, the bath and the fastest particle allow. A bath that acts at the ends of
+/// steps moves the kinetic energy by at most a tenth of its distance from the mean at once. A particle flies no farther
+/// than a quarter of the longest edge, as in the slab core: positions would lose digits, and forces that begin on the
+/// way would be missed. If nothing moves, steps do not grow.
 template <int D>
 double Simulation<D>::longest_step() const {
-  constexpr double kOfRelaxation = 0.1;
+  constexpr double kOfRelaxation = 0.1, kOfEdge = 0.25;
+  double squared = 0;
+  for (const Vec<D>& v : system_->particles.v) squared = std::max(squared, v.squaredNorm());
+  const double fastest = std::sqrt(system_->decomposition.largest(squared));
   const Bath& bath = system_->box.bath;
-  double longest = std::min(system_->box.longest_step(), plan_.longest_step > 0 ? plan_.longest_step : kNever);
+  double longest = fastest > 0 ? kOfEdge * system_->box.edges.maxCoeff() / fastest : plan_.step;
+  longest = std::min({longest, system_->box.longest_step(), plan_.longest_step > 0 ? plan_.longest_step : kNever});
   if (bath.type != Bath::Type::none && bath.rate > 0) longest = std::min(longest, kOfRelaxation / bath.rate);
   return longest;
 }
@@ -478,7 +484,7 @@ void Simulation<D>::adapt(const Slab& slab, const SlabReport<D>& report, std::ui
     s.shortest_step = s.shortest_step > 0 ? std::min(s.shortest_step, complete) : complete;
     s.longest_step = std::max(s.longest_step, complete);
   }
-  clock_.adapt(slab, report.error, contacts, longest_step());
+  clock_.adapt(slab, report.error, contacts, clock_.adapts() ? longest_step() : kNever);
 }
 
 /// Sets the times of a ramp of the bath's temperature, unless they are given or an earlier plan has set them.
