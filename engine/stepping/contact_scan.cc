@@ -63,11 +63,12 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
   key.time = time;
   for (const auto& pair : list_.cover(x, 0.5 * widest_)) {
     const Vec<D> d = x[pair.i] - x[pair.j] + box_.shift(pair.image);
-    const double sigma = contact_distance(pair.i, pair.j), reach = sigma + std::max(tolerance(sigma), widest_);
-    if (d.squaredNorm() > reach * reach) continue;
+    const double sigma = contact_distance(pair.i, pair.j), most = sigma + std::max(tolerance(sigma), widest_);
+    if (d.squaredNorm() > most * most) continue;
     key.lo = pair.i;
     key.hi = pair.j;
     key.image = pair.image;
+    if (widest_ > 0 && d.norm() - sigma > reach(key, d)) continue;
     note(key, d, d.norm() - sigma, sigma);
   }
   key.kind = EventKind::wall;
@@ -79,6 +80,7 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
       if (gap > std::max(tolerance(particles_.radius[i]), widest_)) continue;
       key.lo = i;
       key.hi = wall.number;
+      if (widest_ > 0 && gap > reach(key, wall.normal)) continue;
       note(key, wall.normal, gap, particles_.radius[i], wall.velocity);
     }
   }
@@ -95,7 +97,6 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
 /// Decides what may happen to contacts with a small gap.
 template <int D>
 void ContactScan<D>::note_open() {
-  std::erase_if(touching_, [&](const Touch<D>& touch) { return open(touch) && !rest_.dissipates(touch.key); });
   std::vector<char> touched(particles_.size(), 0);
   for (const Touch<D>& touch : touching_)
     if (!open(touch)) touched[touch.key.lo] = touched[touch.pair() ? touch.key.hi : touch.key.lo] = 1;
@@ -139,7 +140,7 @@ double ContactScan<D>::normal_speed(const Touch<D>& touch, Positions<D> v) const
 
 template <int D>
 void ContactScan<D>::count_event(const EventKey<D>& key) {
-  if (++events_ > max_events_) throw_too_many_contacts(max_events_, partners(key, box_));
+  if (++events_ > max_events_) throw_too_many_contacts(box_.contacts, max_events_, partners(key, box_));
 }
 
 template <int D>
@@ -354,7 +355,7 @@ void ContactScan<D>::drop_open(Positions<D> x) {
     const auto& [key, x_lo] = std::pair(contact.key, x[contact.key.lo]);
     const double gap = key.kind == EventKind::pair ? normal(key, x).norm() - rest_.distance(key)
                                                    : box_.wall(key.hi).gap(x_lo, rest_.distance(key));
-    return gap > std::max(tolerance(rest_.distance(key)), widest_);
+    return gap > reach(key, normal(key, x));
   });
 }
 

@@ -136,6 +136,10 @@ class ContactScan {
 
  private:
   bool open(const Touch<D>& touch) const { return touch.gap > tolerance(rest_.distance(touch.key)); }
+  /// The largest gap at which a contact is looked at.
+  double reach(const EventKey<D>& key, const Vec<D>& normal) const {
+    return std::max(tolerance(rest_.distance(key)), rest_.widest_gap(key, normal));
+  }
   void note_open();
   double count_dissipated(Positions<D> before, Positions<D> after);
   void find_touching(double time, Positions<D> x);

@@ -84,18 +84,26 @@ class RestCriterion {
   /// If it dissipates it is held where it is if the gap is as small as this: a bounce at an eighth of the speed at
   /// which approaches end opens it as far. 0 if nothing presses it.
   double holding_gap(const EventKey<D>& key, const Vec<D>& normal, double force) const;
-  /// The largest gap of a contact that dissipates, from which a slow approach stops.
+  /// The largest gap of this contact from which a slow approach stops; 0 unless it dissipates.
+  double widest_gap(const EventKey<D>& key, const Vec<D>& normal) const;
+  /// No widest_gap() is larger than this.
   double widest_gap() const;
+  /// The rest speed of the contact's law, 0 unless it dissipates. The default is the speed that a fall from kRestHeight
+  /// contact distances gives under the forces on its spheres, or ContactLaw::slowest() if that is faster: forces that
+  /// push the spheres apart give none, and neither does a gas without forces.
+  double rest_speed(const EventKey<D>& key, const Vec<D>& normal) const;
 
   /// Whether a contact that opens at this speed, and closes again with this acceleration, rests; it does until the end
   /// of the step. False if this is known already.
-  bool falls_back(const EventKey<D>& key, double closing, double speed);
+  bool falls_back(const EventKey<D>& key, const Vec<D>& normal, double closing, double speed);
 
  private:
   const ContactLaw& law_of(const EventKey<D>& key) const;  // unless all contacts are elastic
   double pressing(const EventKey<D>& key, const Vec<D>& normal, double force) const;
-  double slowest_impact(const EventKey<D>& key, double closing) const;
-  double slowest_bounce(const EventKey<D>& key, double closing) const;
+  double opening_by_forces(const EventKey<D>& key, const Vec<D>& normal) const;
+  double slowest_impact(const EventKey<D>& key, const Vec<D>& normal, double closing) const;
+  double slowest_bounce(const EventKey<D>& key, const Vec<D>& normal, double closing) const;
+  double acceleration(Id i) const { return a_ && i < a_->size() ? (*a_)[i].norm() : 0; }
   double speed_of_rest(double closing, double sigma) const {
     return std::min(std::sqrt(2 * closing * kRestingGap * sigma), 0.5 * closing * length_ / kMostBounces);
   }
