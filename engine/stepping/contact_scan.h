@@ -164,6 +164,7 @@ class ContactScan {
   double count_push(const RestingContact<D>& contact, double impulse, double speed);
   double stop_rounding(Vectors<D> v) const;
   Vec<D> normal(const EventKey<D>& key, Positions<D> x) const { return contact_normal<D>(box_, key, x); }
+  double least_opening(const EventKey<D>& key, Positions<D> v, Positions<D> a, double time_left) const;
   double normal_slack(const RestingContact<D>& contact, Positions<D> v) const;
   bool press_apart(Vectors<D> w, double force);
   double normal_speed(const Touch<D>& touch, Positions<D> v) const;
