@@ -127,7 +127,7 @@ double RestCriterion<D>::slowest_impact(const EventKey<D>& key, const Vec<D>& no
 /// A contact that opens more slowly than this closes again within the step so slowly that it stops.
 template <int D>
 double RestCriterion<D>::slowest_bounce(const EventKey<D>& key, const Vec<D>& normal, double closing) const {
-  if (!dissipates(key) || !(closing > 0)) return 0;
+  if (!dissipates(key)) return 0;
   return std::min(slowest_impact(key, normal, closing), 0.5 * closing * length_);
 }
 

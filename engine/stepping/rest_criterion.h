@@ -2,6 +2,23 @@
 #pragma once
 // When a contact counts as at rest. Contacts without a law rest at the level of rounding, because bouncing would repeat
 // without end. Contacts that dissipate also rest below the rest speed of their law.
+//
+//   from      to        when; u is the normal speed, positive where the gap opens   energy
+//   free      touching  the gap is rounding or, with a law, at most widest_gap()    none
+//   touching  touching  u < −stopping_speed(): an impulse, if the gap is closed     ½ m (1 − e²) u² dissipated
+//                       or a partner touches another sphere
+//   touching  held      −stopping_speed() ≤ u < 0: a reaction stops the approach    ½ m u² dissipated; without a
+//                                                                                   law returned (edda, cdda)
+//   touching  held      0 ≤ u ≤ holding_speed(), if the gap is at most              none
+//                       holding_gap(), or if the contact was held before
+//   touching  free      u > holding_speed()                                         none
+//   held      held      the reaction that keeps it from approaching is positive     its work: of a wall, or folded
+//   held      free      that reaction is zero                                       none
+//   held      touching  a partner is hit, or the contact falls back: the piece      none
+//                       ends there
+//
+// ContactScan::sort_out() decides between the rows from `touching`, ContactScan::hold() and hold_means() between those
+// from `held`, SlabCore::serve() finds what ends a piece.
 
 #include <span>
 #include <utility>

@@ -114,6 +114,37 @@ TEST(RestingSpeed, IsThatOfABounceThatOpensNoGapOrIsTooShort) {
   EXPECT_DOUBLE_EQ(Two(elastic, {{0, 0}, {0, 0}}).resting(kPair, 6), std::sqrt(2 * 8 * kRestingGap * 1.0));
 }
 
+TEST(RestingSpeed, OfFastSpheresUnderPressureIsTheRounding) {
+  const Two pressed({{"restitution", 1.0}}, {{0, 0}, {0, -2}});
+  EXPECT_DOUBLE_EQ(pressed.resting(kPair, 0, {1e8, 0}), kRounding * (2e8 + 0.2));
+}
+
+TEST(RestingSpeed, AFloorThatComesUpPresses) {
+  Two lifted({{"restitution", 1.0}}, {{0, 0}, {0, 0}});
+  lifted.system->box.add({.name = "y-", .amplitude = 0.1, .frequency = 1, .turns = 0.75});  // lowest at the start
+  lifted.system->box.begin_step(0, 0.1);
+  const double up = lifted.system->box.wall(2).acceleration;
+  ASSERT_GT(up, 0);
+  EXPECT_DOUBLE_EQ(lifted.resting(kFloor), std::sqrt(2 * up * kRestingGap * 0.4));
+}
+
+TEST(RestingSpeed, NothingRestsOnAThermalWall) {
+  Two hot({{"restitution", 0.5}}, {{0, -1}, {0, -1}});
+  hot.system->box.add({.name = "y-", .temperature = 2.0});
+  const double resting = hot.resting(kFloor);
+  EXPECT_LT(resting, 0);
+  EXPECT_EQ(hot.criterion->stopping_speed(kFloor, hot.normal(kFloor), 0, resting), resting);
+  EXPECT_EQ(hot.criterion->holding_speed(kFloor, hot.normal(kFloor), 0, resting), resting);
+  EXPECT_EQ(hot.rest_speed(kFloor), 0);
+}
+
+TEST(StoppingSpeed, KicksStopOnlyWhatHasALaw) {
+  Two elastic({{"between", std::vector<std::string>{"*", "y-"}}, {"restitution", 0.5}}, {{0, 0}, {0, -2}});
+  elastic.criterion->stop_within(0.1);
+  EXPECT_EQ(elastic.criterion->stopping_speed(kPair, elastic.normal(kPair), 0, 1e-9), 1e-9);
+  EXPECT_EQ(elastic.criterion->holding_speed(kPair, elastic.normal(kPair), 0, 1e-9), 1e-9);
+}
+
 TEST(HoldingSpeed, IsThatOfABounceWithinTheStep) {
   Two falls({{"restitution", 0.5}, {"rest_speed", 0.05}}, {{0, 0}, {0, -2}});
   const auto holding = [&] { return falls.criterion->holding_speed(kPair, falls.normal(kPair), 0, 0); };
