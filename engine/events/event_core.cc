@@ -139,7 +139,8 @@ double EventCore<D>::run(double end, const Report& report) {
     if (generation > std::numeric_limits<std::uint16_t>::max())
       throw Error(Failure::numerical, partners(queue_.key_of(i), box_) +
                                           " collide without end at one instant; separate the spheres that touch there");
-    if (++events_ > report.max_events) throw_too_many_contacts(report.max_events, partners(queue_.key_of(i), box_));
+    if (++events_ > report.max_events)
+      throw_too_many_contacts(box_.contacts, report.max_events, partners(queue_.key_of(i), box_));
     if (a.kind == EventKind::pair) {
       const Slot j = flights_.packing().slot(a.partner);
       collide_pair(i, j, a.partner, now, generation, report);

@@ -28,6 +28,7 @@ namespace {
 constexpr int kMostPieces = 1 << 14;
 /// The velocity that the iteration of a piece leaves undetermined, relative to the largest (discrete_gradient.cc).
 constexpr double kRoundingOfPieces = 16 * std::numeric_limits<double>::epsilon();
+constexpr double kMostFolded = 0.1;  // of the kinetic energy, as in edda
 
 template <int D>
 class CollisionDiscreteDerivative : public Integrator<D> {
@@ -46,6 +47,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     scan_.emplace(system, max_events_, reactions_);
     scan_->rest().let_open();
     system.fields.add_value("reactions", reactions_);
+    system.fields.add_value("cdda owed", owed_);
     piece_.emplace(system, order_);
     contacts_.emplace(system, *scan_);
   }
@@ -62,7 +64,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     double done = 0, longest = slab.length;
     bool ended = false;
     while (!ended) {
-      scan_->resolve(done, p.x, p.v, contact);
+      owed_ += scan_->resolve(done, p.x, p.v, contact);
       const double time_left = slab.length - done;
       if (!(time_left > 0)) break;  // the last contact rounds to the end of the slab
       const double wanted = std::min(time_left, longest), tau = find_piece(p, wanted);
@@ -71,9 +73,15 @@ class CollisionDiscreteDerivative : public Integrator<D> {
         if (slab.accuracy > 0) throw StepTooLong{.length = 0.5 * slab.length, .id = 0};
         ++report.counters.slabs_halved;
         if (longest * kMostPieces < slab.length)
-          throw Error(Failure::numerical,
-                      "the discrete-gradient step does not converge even in " + std::to_string(kMostPieces) +
-                          " pieces; the forces are not finite or far too stiff for step = " + short_text(slab.length));
+          throw Error(
+              Failure::numerical,
+              "the discrete-gradient step does not converge even in " + std::to_string(kMostPieces) +
+                  " pieces; the forces are not finite or far too stiff for step = " + short_text(slab.length) +
+                  (scan_->resting().empty()
+                       ? ""
+                       : ", or " + std::to_string(scan_->resting().size()) +
+                             " contacts at rest are wedged between walls or neighbours; take a smaller step, or "
+                             "integrator.type = \"edda\""));
         continue;
       }
       judge(system, slab, tau, report);
@@ -83,7 +91,8 @@ class CollisionDiscreteDerivative : public Integrator<D> {
       std::ranges::copy(piece_->v(), p.v.begin());
       scan_->remember(tau);
       system.box.time += tau;
-      scan_->slide(p.x, p.v);
+      owed_ += scan_->slide(p.x, p.v);
+      fold(system);
       done += tau;
     }
     system.wrap();
@@ -105,6 +114,31 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     double squared = 0;
     for (const Vec<D>& v : p.v) squared = std::max(squared, v.squaredNorm());
     return std::sqrt(squared);
+  }
+
+  /// Folds what contacts have lost that came to rest, or that were held over a piece, into the velocities relative to
+  /// the centre of mass. If it is more than a tenth of the kinetic energy, contacts with a law have dissipated it, and
+  /// without laws it is carried over.
+  void fold(System<D>& system) {
+    if (owed_ == 0) return;
+    auto& p = system.particles;
+    Vec<D> centre = Vec<D>::Zero();
+    double mass = 0, kinetic = 0;
+    for (Id i = 0; i < p.size(); ++i) {
+      mass += moving_mass(p.mass[i]);
+      centre += moving_mass(p.mass[i]) * p.v[i];
+    }
+    // As in edda: particles move relative to a centre of mass that has a constant velocity, or to the box.
+    centre *= system.size() > 1 && system.keeps_momentum() ? 1 / mass : 0.0;
+    for (Id i = 0; i < p.size(); ++i) kinetic += 0.5 * moving_mass(p.mass[i]) * (p.v[i] - centre).squaredNorm();
+    if (!(std::abs(owed_) <= kMostFolded * kinetic)) {
+      if (owed_ > 0 && !system.box.contacts.elastic()) counters_->dissipated.add(std::exchange(owed_, 0));
+      return;
+    }
+    const double share = owed_ / kinetic, stretch = share / (1 + std::sqrt(1 + share));
+    for (Id i = 0; i < p.size(); ++i)
+      if (!p.fixed(i)) p.v[i] += stretch * (p.v[i] - centre);
+    counters_->folded += std::abs(std::exchange(owed_, 0));
   }
 
   /// Leaves in piece_ the longest piece from p, at most `time_left`, that ends before or in the first contact; returns
@@ -170,6 +204,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
   std::vector<Vec<D>> last_a_;  // mean accelerations of the last piece, of this length; 0: those at the start
   double last_length_ = 0;
   EventKey<D> violator_{};  // the contact that limits the last piece
+  double owed_ = 0;         // missing energy that is carried over
   Counters* counters_ = nullptr;
   SlabWatch* watch_ = nullptr;
 };

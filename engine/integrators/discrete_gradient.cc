@@ -72,6 +72,13 @@ bool DiscreteGradient<D>::substep(double tau, std::size_t stage, ContactScan<D>&
       change = std::max(change, (next_[i] - mean_[i]).squaredNorm());
       speed = std::max({speed, next_[i].squaredNorm(), v_[i].squaredNorm()});
     }
+    // At rest the velocities are what is left of the kicks by reactions and forces, whose rounding they have.
+    for (const auto& contact : scan.resting()) {
+      const double lightest = contact.key.kind == EventKind::pair ? std::min(mass[contact.key.lo], mass[contact.key.hi])
+                                                                  : mass[contact.key.lo];
+      const double kick = 0.5 * tau * contact.force / lightest;
+      speed = std::max(speed, kick * kick);
+    }
     change = std::sqrt(change);
     // Smaller increments are rounding errors, and their ratios are meaningless.
     const double floor = 16 * std::numeric_limits<double>::epsilon() * std::sqrt(speed);

@@ -14,7 +14,8 @@
 //   r = Σ m [e·(Δx − h v′) − ½ h² e²],   v′ before the kick,
 //
 // is folded into the velocities by a common factor. If the kinetic energy is too small for that, the sweeps continue to
-// rounding, or the piece is shortened; the energy that rounding then leaves is carried over to the next piece.
+// rounding, or the piece is shortened; the energy that rounding then leaves is carried over to the next piece or, if
+// contacts dissipate, is dissipated: a pile at rest has no velocities that it could be folded into.
 //
 // Contacts at rest are held by reactions (engine/stepping/resting.h), which are part of m a′; their work, zero once the
 // sweeps have converged, is part of r.
@@ -402,10 +403,11 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     const double missing = sums.missing.value(), most = kMostFolded * sums.kinetic.value();
     const bool folds_all = std::abs(missing + owed_) <= most, folds = folds_all || std::abs(missing) <= most;
     const double r = folds_all ? missing + owed_ : missing, share = r / sums.kinetic.value();
+    const double left = folds_all ? 0 : folds ? owed_ : owed_ + missing;
+    const bool dissipates = !system.box.contacts.elastic();
     // The stretch is √(1 + share) − 1, computed without cancellation.
-    balance_ = {.owed = folds_all ? 0
-                        : folds   ? owed_
-                                  : owed_ + missing,
+    balance_ = {.owed = dissipates ? 0 : left,
+                .dissipated = dissipates ? left : 0,
                 .folded = folds ? std::abs(r) : 0,
                 .stretch = folds && r != 0 ? share / (1 + std::sqrt(1 + share)) : 0};
     if (any_freezes_)
@@ -427,6 +429,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     if (balance_.stretch != 0)
       for (auto& v : p.v) v += balance_.stretch * (v - centre());
     owed_ = balance_.owed;
+    if (balance_.dissipated != 0) counters_->dissipated.add(balance_.dissipated);
     counters_->folded += balance_.folded;
     counters_->frozen += balance_.frozen;
     system.decomposition.update_halo();
@@ -449,7 +452,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   std::vector<Vec<D>> flown_, w_;  // mean velocities of particles in contacts at rest
   std::vector<Vec<D>> v_end_;
   struct Balance {
-    double owed = 0, folded = 0, stretch = 0;
+    double owed = 0, dissipated = 0, folded = 0, stretch = 0;
     std::uint64_t frozen = 0;
   } balance_;                         // of the last piece that was solved
   double owed_ = 0;                   // missing energy that is carried over

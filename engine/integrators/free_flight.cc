@@ -37,7 +37,7 @@ class FreeFlight : public Integrator<D> {
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     if (slab.index != epoch_) epoch_ = slab.index, contacts_ = 0;
     const std::uint64_t before = report.counters.contacts(), most = max_events_ * system.size();
-    if (contacts_ > most) throw_too_many_contacts(most);
+    if (contacts_ > most) throw_too_many_contacts(system.box.contacts, most);
     if (windowed_) {
       fly(*windowed_, system, slab, report, most);
       report.counters.windows = windowed_->window_counts();

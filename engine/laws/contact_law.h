@@ -31,7 +31,8 @@ struct ContactLaw {
   std::optional<double> tangential{};  ///< β: −1 smooth, 0 the surfaces stick, 1 their velocity is reversed; none: no
                                        ///< spins
   double friction = std::numeric_limits<double>::infinity();  ///< μ
-  /// Below it ContactLaws::restitution_when_slow applies [length/time]; negative: kRestFraction of the thermal speed.
+  /// Below it ContactLaws::restitution_when_slow applies [length/time]; negative: kRestFraction of the thermal speed,
+  /// and in methods with steps at least RestCriterion::rest_speed().
   double rest_speed = -1;
 
   /// Relative to the thermal speed: what slower approaches could lose is 1e-16 of the energy, the rounding of a sum.

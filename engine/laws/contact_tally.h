@@ -153,6 +153,6 @@ struct ContactTally : OverlapTally {
 };
 
 /// Throws the error for a step with more contacts than `most`; `last` names the partners of the last one, if known.
-[[noreturn]] void throw_too_many_contacts(std::uint64_t most, const std::string& last = "");
+[[noreturn]] void throw_too_many_contacts(const ContactLaws& laws, std::uint64_t most, const std::string& last = "");
 
 }  // namespace carom

@@ -137,11 +137,11 @@ double WindowedFlight<D>::run(double end, const Report& report) {
       valid = !vote.no_room && vote.reached == stop && !length_.too_fast(vote.speed, stop - now_);
       return valid && vote.changed;
     });
-    if (events_ > report.max_events) throw_too_many_contacts(report.max_events);
+    if (events_ > report.max_events) throw_too_many_contacts(box_.contacts, report.max_events);
     length_.allow_for(vote.speed);
     log_full_at = vote.reached < stop ? vote.reached : kForever;
     if (!valid) {  // revoke the window; if the log has no room for more, run it up to there
-      if (!(log_full_at > now_)) throw_too_many_contacts(report.max_events);
+      if (!(log_full_at > now_)) throw_too_many_contacts(box_.contacts, report.max_events);
       ++subdomain_.counts.cut;
       subdomain_.paths().cut({.time = -kForever});
       reload();
@@ -174,7 +174,8 @@ double WindowedFlight<D>::run(double end, const Report& report) {
   }
   const ContactTally all = sum_of_all(ranks_, sum);
   report.counters.add(all);
-  if (events_ = events_before + all.contacts(); events_ > report.max_events) throw_too_many_contacts(report.max_events);
+  if (events_ = events_before + all.contacts(); events_ > report.max_events)
+    throw_too_many_contacts(box_.contacts, report.max_events);
   if (report.contacts) merge_contacts<D>(gather_on_first(ranks_, message_of<Contact<D>>(contacts)), *report.contacts);
   return reached;
 }

@@ -15,6 +15,8 @@ namespace {
 // Generations of impulses at one instant: an impact on a row of n spheres takes n generations, a light sphere between
 // two heavy ones π √(M/m), which is 3000 for masses of 1 : 10⁶ (Galperin, Regul. Chaotic Dyn. 8 (2003) 375).
 constexpr std::uint32_t kMostGenerations = 30000;
+constexpr int kRoundsOfBraking =
+    8;  // each changes the bounds by u·a times the step, relative to those of the one before
 constexpr double kMostCorrection = 1e-6 / kRounding;  // of an overlap, relative to the rounding of the speeds
 
 }  // namespace
@@ -63,11 +65,12 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
   key.time = time;
   for (const auto& pair : list_.cover(x, 0.5 * widest_)) {
     const Vec<D> d = x[pair.i] - x[pair.j] + box_.shift(pair.image);
-    const double sigma = contact_distance(pair.i, pair.j), reach = sigma + std::max(tolerance(sigma), widest_);
-    if (d.squaredNorm() > reach * reach) continue;
+    const double sigma = contact_distance(pair.i, pair.j), most = sigma + std::max(tolerance(sigma), widest_);
+    if (d.squaredNorm() > most * most) continue;
     key.lo = pair.i;
     key.hi = pair.j;
     key.image = pair.image;
+    if (widest_ > 0 && d.norm() - sigma > reach(key, d)) continue;
     note(key, d, d.norm() - sigma, sigma);
   }
   key.kind = EventKind::wall;
@@ -79,6 +82,7 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
       if (gap > std::max(tolerance(particles_.radius[i]), widest_)) continue;
       key.lo = i;
       key.hi = wall.number;
+      if (widest_ > 0 && gap > reach(key, wall.normal)) continue;
       note(key, wall.normal, gap, particles_.radius[i], wall.velocity);
     }
   }
@@ -95,7 +99,6 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
 /// Decides what may happen to contacts with a small gap.
 template <int D>
 void ContactScan<D>::note_open() {
-  std::erase_if(touching_, [&](const Touch<D>& touch) { return open(touch) && !rest_.dissipates(touch.key); });
   std::vector<char> touched(particles_.size(), 0);
   for (const Touch<D>& touch : touching_)
     if (!open(touch)) touched[touch.key.lo] = touched[touch.pair() ? touch.key.hi : touch.key.lo] = 1;
@@ -139,7 +142,7 @@ double ContactScan<D>::normal_speed(const Touch<D>& touch, Positions<D> v) const
 
 template <int D>
 void ContactScan<D>::count_event(const EventKey<D>& key) {
-  if (++events_ > max_events_) throw_too_many_contacts(max_events_, partners(key, box_));
+  if (++events_ > max_events_) throw_too_many_contacts(box_.contacts, max_events_, partners(key, box_));
 }
 
 template <int D>
@@ -276,22 +279,37 @@ bool ContactScan<D>::press_apart(Vectors<D> w, double force) {
 
 template <int D>
 void ContactScan<D>::hold(Positions<D> v, Vectors<D> a, double time_left) {
-  for (auto& contact : resting_) {
-    contact.bound = contact.slack = 0;
-    if (contact.key.kind != EventKind::pair) {
-      contact.bound = box_.wall(contact.key.hi).acceleration;
-      continue;
+  // d·d − σ² = s² ((u² + d·a) + (u·a) s + ¼ a² s²) must not be negative up to `time_left`. For a pair that turns (u)
+  // while it slows down (u·a < 0) the second term would cause an overlap. The reaction of a pair, normal to u, does not
+  // change its u·a, but those of its neighbours do: the problem is solved again until each bound suits the reactions.
+  const std::vector<Vec<D>> by_forces(a.begin(), a.end());
+  for (int round = 0; round < kRoundsOfBraking; ++round) {
+    bool suits = true;
+    for (auto& contact : resting_) {
+      contact.slack = 0;
+      const double bound = least_opening(contact.key, v, a, time_left);
+      if (round > 0) {
+        const Vec<D> between =
+            contact.key.kind == EventKind::pair ? Vec<D>(a[contact.key.lo] - a[contact.key.hi]) : a[contact.key.lo];
+        suits = suits && contact.normal.dot(between) >= bound - kRounding * std::abs(bound);
+      }
+      contact.bound = round == 0 ? bound : std::max(bound, contact.bound);
     }
-    // d·d − σ² = s² ((u² + d·a) + (u·a) s + ¼ a² s²) must not be negative up to `time_left`. For a pair that turns (u)
-    // while it slows down (u·a < 0) the second term would cause an overlap; the reaction, normal to u, does not change
-    // u·a.
-    const Vec<D> u = v[contact.key.lo] - v[contact.key.hi];
-    const double braking = std::max(0.0, -u.dot(a[contact.key.lo] - a[contact.key.hi]));
-    contact.bound = braking * time_left - u.squaredNorm();
+    if (round > 0 && suits) break;
+    std::ranges::copy(by_forces, a.begin());
+    press_apart(a, 1);
   }
-  press_apart(a, 1);
   std::erase_if(resting_,
                 [](const auto& contact) { return contact.lambda == 0; });  // these separate, and may meet again
+}
+
+/// The least acceleration, times the length of the normal, at which a resting contact opens, so that the spheres do not
+/// overlap within `time_left` under the accelerations a.
+template <int D>
+double ContactScan<D>::least_opening(const EventKey<D>& key, Positions<D> v, Positions<D> a, double time_left) const {
+  if (key.kind != EventKind::pair) return box_.wall(key.hi).acceleration;
+  const Vec<D> u = v[key.lo] - v[key.hi];
+  return std::max(0.0, -u.dot(a[key.lo] - a[key.hi])) * time_left - u.squaredNorm();
 }
 
 template <int D>
@@ -354,7 +372,7 @@ void ContactScan<D>::drop_open(Positions<D> x) {
     const auto& [key, x_lo] = std::pair(contact.key, x[contact.key.lo]);
     const double gap = key.kind == EventKind::pair ? normal(key, x).norm() - rest_.distance(key)
                                                    : box_.wall(key.hi).gap(x_lo, rest_.distance(key));
-    return gap > std::max(tolerance(rest_.distance(key)), widest_);
+    return gap > reach(key, normal(key, x));
   });
 }
 

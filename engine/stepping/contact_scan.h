@@ -136,6 +136,10 @@ class ContactScan {
 
  private:
   bool open(const Touch<D>& touch) const { return touch.gap > tolerance(rest_.distance(touch.key)); }
+  /// The largest gap at which a contact is looked at.
+  double reach(const EventKey<D>& key, const Vec<D>& normal) const {
+    return std::max(tolerance(rest_.distance(key)), rest_.widest_gap(key, normal));
+  }
   void note_open();
   double count_dissipated(Positions<D> before, Positions<D> after);
   void find_touching(double time, Positions<D> x);
@@ -160,6 +164,7 @@ class ContactScan {
   double count_push(const RestingContact<D>& contact, double impulse, double speed);
   double stop_rounding(Vectors<D> v) const;
   Vec<D> normal(const EventKey<D>& key, Positions<D> x) const { return contact_normal<D>(box_, key, x); }
+  double least_opening(const EventKey<D>& key, Positions<D> v, Positions<D> a, double time_left) const;
   double normal_slack(const RestingContact<D>& contact, Positions<D> v) const;
   bool press_apart(Vectors<D> w, double force);
   double normal_speed(const Touch<D>& touch, Positions<D> v) const;

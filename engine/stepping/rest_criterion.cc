@@ -49,20 +49,41 @@ const ContactLaw& RestCriterion<D>::law_of(const EventKey<D>& key) const {
                                      : box_.contacts.of_wall(species[key.lo], key.hi);
 }
 
+/// The acceleration at which forces, without reactions, open a contact.
+template <int D>
+double RestCriterion<D>::opening_by_forces(const EventKey<D>& key, const Vec<D>& normal) const {
+  const bool pair = key.kind == EventKind::pair;
+  Vec<D> a = Vec<D>::Zero();
+  if (a_ && key.lo < a_->size()) a = pair ? Vec<D>((*a_)[key.lo] - (*a_)[key.hi]) : (*a_)[key.lo];
+  if (!pair && !box_.options.empty()) a -= box_.wall(key.hi).acceleration * normal;
+  return a.dot(normal) / normal.norm();
+}
+
 /// The acceleration at which a contact would close by forces and, if contacts dissipate, by other reactions.
 template <int D>
 double RestCriterion<D>::pressing(const EventKey<D>& key, const Vec<D>& normal, double force) const {
   const bool pair = key.kind == EventKind::pair;
-  const auto between = [&](const std::vector<Vec<D>>& w) { return pair ? Vec<D>(w[key.lo] - w[key.hi]) : w[key.lo]; };
-  Vec<D> a = Vec<D>::Zero();
-  if (a_ && key.lo < a_->size()) a = between(*a_);
-  if (!pair && !box_.options.empty()) a -= box_.wall(key.hi).acceleration * normal;
   const double inverse_mass = 1 / particles_.mass[key.lo] + (pair ? 1 / particles_.mass[key.hi] : 0.0);
-  double closing = std::max(force * inverse_mass, -a.dot(normal) / normal.norm());
+  const double opening = opening_by_forces(key, normal);
+  double closing = std::max(force * inverse_mass, -opening);
   if (!fallen_back_.empty())
     for (const auto& [partners, acceleration] : fallen_back_)
       if (partners == without_time(key)) closing = std::max(closing, acceleration);
-  return held_.empty() ? closing : std::max(closing, -(a + between(held_)).dot(normal) / normal.norm());
+  if (held_.empty()) return closing;
+  const Vec<D> by_others = pair ? Vec<D>(held_[key.lo] - held_[key.hi]) : held_[key.lo];
+  return std::max(closing, -opening - by_others.dot(normal) / normal.norm());
+}
+
+template <int D>
+double RestCriterion<D>::rest_speed(const EventKey<D>& key, const Vec<D>& normal) const {
+  if (!dissipates(key)) return 0;
+  const ContactLaw& law = law_of(key);
+  const double slowest = law.slowest(box_.contacts.thermal_speed);
+  if (law.rest_speed >= 0) return slowest;
+  const double strongest =
+      key.kind == EventKind::pair ? std::max(acceleration(key.lo), acceleration(key.hi)) : acceleration(key.lo);
+  const double falling = strongest - std::max(0.0, opening_by_forces(key, normal));
+  return std::max(slowest, std::sqrt(2 * std::max(0.0, falling) * kRestHeight * distance(key)));
 }
 
 template <int D>
@@ -81,60 +102,72 @@ template <int D>
 double RestCriterion<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& normal, double force,
                                         double resting) const {
   if (resting < 0 || !dissipates(key)) return resting;
-  return std::max(resting, slowest_impact(key, pressing(key, normal, force)));
+  return std::max(resting, slowest_impact(key, normal, pressing(key, normal, force)));
 }
 
 template <int D>
 double RestCriterion<D>::holding_speed(const EventKey<D>& key, const Vec<D>& normal, double force,
                                        double resting) const {
   if (resting < 0 || lets_open_ || !dissipates(key)) return resting;
-  return std::max(resting, slowest_bounce(key, pressing(key, normal, force)));
+  return std::max(resting, slowest_bounce(key, normal, pressing(key, normal, force)));
 }
 
 /// A contact that dissipates stops if it approaches more slowly than this.
 template <int D>
-double RestCriterion<D>::slowest_impact(const EventKey<D>& key, double closing) const {
+double RestCriterion<D>::slowest_impact(const EventKey<D>& key, const Vec<D>& normal, double closing) const {
   const ContactLaw& law = law_of(key);
   // Kicks sustain a bounce with the approach speed n kick/(1 + e) that takes n steps, as long as n ≤ 2e n/(1 + e) + 1.
   const double kick = kick_ * std::max(0.0, closing),
                inverse_mass =
                    1 / particles_.mass[key.lo] + (key.kind == EventKind::pair ? 1 / particles_.mass[key.hi] : 0.0);
   const double e = law.restitution_at({kick, inverse_mass}, 0, 0);
-  return law.slowest(box_.contacts.thermal_speed) + kick * std::min(1 / (1 - e), 1.0 * kMostBounces);
+  return rest_speed(key, normal) + kick * std::min(1 / (1 - e), 1.0 * kMostBounces);
 }
 
 /// A contact that opens more slowly than this closes again within the step so slowly that it stops.
 template <int D>
-double RestCriterion<D>::slowest_bounce(const EventKey<D>& key, double closing) const {
-  if (!dissipates(key) || !(closing > 0)) return 0;
-  return std::min(slowest_impact(key, closing), 0.5 * closing * length_);
+double RestCriterion<D>::slowest_bounce(const EventKey<D>& key, const Vec<D>& normal, double closing) const {
+  if (!dissipates(key)) return 0;
+  return std::min(slowest_impact(key, normal, closing), 0.5 * closing * length_);
 }
 
 template <int D>
 double RestCriterion<D>::holding_gap(const EventKey<D>& key, const Vec<D>& normal, double force) const {
   if (!dissipates(key)) return 0;
-  const double closing = pressing(key, normal, force), slowest = slowest_bounce(key, closing);
+  const double closing = pressing(key, normal, force), slowest = slowest_bounce(key, normal, closing);
   return closing > 0 ? slowest * slowest / (2 * kMostBounces * closing) : 0;
 }
 
 /// Kicks would close a gap that is smaller than what a bounce within a step opens with more energy than the fall gives,
-/// and that energy would keep a pile moving. So with kicks the gap is h²/8 times the largest relative acceleration.
+/// and that energy would keep a pile moving. So with kicks the gap is h²/8 times the accelerations of the two spheres.
 template <int D>
-double RestCriterion<D>::widest_gap() const {
-  if (box_.contacts.elastic()) return 0;
-  double widest = 0;
-  if (kicks()) {
-    for (const Vec<D>& a : *a_) widest = std::max(widest, a.squaredNorm());
-    return 0.25 * length_ * length_ * std::sqrt(widest);
-  }
-  for (const ContactLaw& law : box_.contacts.all())
-    if (!law.elastic()) widest = std::max(widest, law.slowest(box_.contacts.thermal_speed) * length_ / kMostBounces);
-  return widest;
+double RestCriterion<D>::widest_gap(const EventKey<D>& key, const Vec<D>& normal) const {
+  if (!dissipates(key)) return 0;
+  if (!kicks()) return rest_speed(key, normal) * length_ / kMostBounces;
+  const double both = acceleration(key.lo) + (key.kind == EventKind::pair ? acceleration(key.hi) : 0.0);
+  return 0.125 * length_ * length_ * both;
 }
 
 template <int D>
-bool RestCriterion<D>::falls_back(const EventKey<D>& key, double closing, double speed) {
-  if (!(closing > 0) || speed > std::max(speed_of_rest(closing, distance(key)), slowest_bounce(key, closing)))
+double RestCriterion<D>::widest_gap() const {
+  if (box_.contacts.elastic()) return 0;
+  double strongest = 0, widest = 0, fastest = 0;
+  if (a_)
+    for (const Vec<D>& a : *a_) strongest = std::max(strongest, a.squaredNorm());
+  strongest = std::sqrt(strongest);
+  if (kicks()) return 0.25 * length_ * length_ * strongest;
+  for (const double radius : particles_.radius) widest = std::max(widest, radius);
+  for (const ContactLaw& law : box_.contacts.all()) {
+    if (law.elastic()) continue;
+    fastest = std::max(fastest, law.slowest(box_.contacts.thermal_speed));
+    if (law.rest_speed < 0) fastest = std::max(fastest, std::sqrt(2 * strongest * kRestHeight * 2 * widest));
+  }
+  return fastest * length_ / kMostBounces;
+}
+
+template <int D>
+bool RestCriterion<D>::falls_back(const EventKey<D>& key, const Vec<D>& normal, double closing, double speed) {
+  if (!(closing > 0) || speed > std::max(speed_of_rest(closing, distance(key)), slowest_bounce(key, normal, closing)))
     return false;
   const EventKey<D> partners = without_time(key);
   if (std::ranges::find(fallen_back_, partners, &std::pair<EventKey<D>, double>::first) != fallen_back_.end())

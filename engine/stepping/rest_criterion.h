@@ -2,6 +2,23 @@
 #pragma once
 // When a contact counts as at rest. Contacts without a law rest at the level of rounding, because bouncing would repeat
 // without end. Contacts that dissipate also rest below the rest speed of their law.
+//
+//   from      to        when; u is the normal speed, positive where the gap opens   energy
+//   free      touching  the gap is rounding or, with a law, at most widest_gap()    none
+//   touching  touching  u < −stopping_speed(): an impulse, if the gap is closed     ½ m (1 − e²) u² dissipated
+//                       or a partner touches another sphere
+//   touching  held      −stopping_speed() ≤ u < 0: a reaction stops the approach    ½ m u² dissipated; without a
+//                                                                                   law returned (edda, cdda)
+//   touching  held      0 ≤ u ≤ holding_speed(), if the gap is at most              none
+//                       holding_gap(), or if the contact was held before
+//   touching  free      u > holding_speed()                                         none
+//   held      held      the reaction that keeps it from approaching is positive     its work: of a wall, or folded
+//   held      free      that reaction is zero                                       none
+//   held      touching  a partner is hit, or the contact falls back: the piece      none
+//                       ends there
+//
+// ContactScan::sort_out() decides between the rows from `touching`, ContactScan::hold() and hold_means() between those
+// from `held`, SlabCore::serve() finds what ends a piece.
 
 #include <span>
 #include <utility>
@@ -84,18 +101,26 @@ class RestCriterion {
   /// If it dissipates it is held where it is if the gap is as small as this: a bounce at an eighth of the speed at
   /// which approaches end opens it as far. 0 if nothing presses it.
   double holding_gap(const EventKey<D>& key, const Vec<D>& normal, double force) const;
-  /// The largest gap of a contact that dissipates, from which a slow approach stops.
+  /// The largest gap of this contact from which a slow approach stops; 0 unless it dissipates.
+  double widest_gap(const EventKey<D>& key, const Vec<D>& normal) const;
+  /// No widest_gap() is larger than this.
   double widest_gap() const;
+  /// The rest speed of the contact's law, 0 unless it dissipates. The default is the speed that a fall from kRestHeight
+  /// contact distances gives under the forces on its spheres, or ContactLaw::slowest() if that is faster: forces that
+  /// push the spheres apart give none, and neither does a gas without forces.
+  double rest_speed(const EventKey<D>& key, const Vec<D>& normal) const;
 
   /// Whether a contact that opens at this speed, and closes again with this acceleration, rests; it does until the end
   /// of the step. False if this is known already.
-  bool falls_back(const EventKey<D>& key, double closing, double speed);
+  bool falls_back(const EventKey<D>& key, const Vec<D>& normal, double closing, double speed);
 
  private:
   const ContactLaw& law_of(const EventKey<D>& key) const;  // unless all contacts are elastic
   double pressing(const EventKey<D>& key, const Vec<D>& normal, double force) const;
-  double slowest_impact(const EventKey<D>& key, double closing) const;
-  double slowest_bounce(const EventKey<D>& key, double closing) const;
+  double opening_by_forces(const EventKey<D>& key, const Vec<D>& normal) const;
+  double slowest_impact(const EventKey<D>& key, const Vec<D>& normal, double closing) const;
+  double slowest_bounce(const EventKey<D>& key, const Vec<D>& normal, double closing) const;
+  double acceleration(Id i) const { return a_ && i < a_->size() ? (*a_)[i].norm() : 0; }
   double speed_of_rest(double closing, double sigma) const {
     return std::min(std::sqrt(2 * closing * kRestingGap * sigma), 0.5 * closing * length_ / kMostBounces);
   }

@@ -29,6 +29,10 @@ inline constexpr double kRounding = 1e-12;
 inline constexpr double kRestingGap = 1e-12;
 inline constexpr int kMostBounces = 64;
 
+/// A contact with a law that names no rest speed rests below the speed of a fall from this many contact distances: a
+/// pile then settles with bounces that no picture of it would show, the last ones 1e-4 radii high.
+inline constexpr double kRestHeight = 0.5e-4;
+
 template <int D>
 struct RestingContact {
   EventKey<D> key;    ///< names the pair, or the sphere and the wall

@@ -159,7 +159,7 @@ FlightEnd<D> SlabCore<D>::fly(Positions<D> a) {
   if (divided)
     compare_ranks(!end.complete || too_many_contacts_ || longest_path_ > 0);
   else if (too_many_contacts_)
-    throw_too_many_contacts(max_events_, partners(end.key, box_));
+    throw_too_many_contacts(box_.contacts, max_events_, partners(end.key, box_));
   else if (longest_path_ > 0 && !a_.empty())
     return {.complete = false, .too_strong = true};
   else if (longest_path_ > 0) {
@@ -396,7 +396,7 @@ bool SlabCore<D>::falls_back(const EventKey<D>& key) {
   const double gap =
       pair ? before.normal.norm() - before.sigma : box_.wall(key.hi).gap(particles_.x[key.lo], before.sigma);
   if (!(gap <= scan_->tolerance(before.sigma)) || !(before.speed > 0)) return false;
-  return scan_->rest().falls_back(key, (before.speed - meeting.speed) / key.time, before.speed);
+  return scan_->rest().falls_back(key, before.normal, (before.speed - meeting.speed) / key.time, before.speed);
 }
 
 /// Starts a new flight of particle i at this event, before the impulse.

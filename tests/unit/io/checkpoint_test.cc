@@ -113,7 +113,7 @@ TEST(Checkpoint, TheOneBeforeIsTakenWhereTheLastIsDamaged) {
     } catch (const Error& e) {
       const std::string text = e.what();
       EXPECT_NE(text.find("damaged or cut off"), std::string::npos) << text;
-      EXPECT_NE(text.find(std::string(age) + " carom; this one reads format 5"), std::string::npos) << text;
+      EXPECT_NE(text.find(std::string(age) + " carom; this one reads format 6"), std::string::npos) << text;
     }
   }
 }
