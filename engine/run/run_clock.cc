@@ -24,9 +24,9 @@ constexpr double kContactsOfRate = 64;
 /// Fewer contacts in a slab cost nothing that matters, however few spheres have them.
 constexpr double kFewContacts = 32;
 
-/// A slab is repeated if it has this many times the contacts that are wanted; its first flight is lost then. A slab is
-/// not repeated if it is only this part of a step: contacts that repeat without end are an error of their own.
-constexpr double kTooMany = 2, kShortestPart = 0x1p-10;
+/// A slab is repeated if it has this many times the contacts that are wanted; its first flight is lost then. Contacts make
+/// no slab shorter than this part of a step: contacts that repeat without end are an error of their own.
+constexpr double kTooMany = 2, kShortestPart = 0x1p-6;
 
 /// The largest change of the length from slab to slab: an acceleration that happens not to change says nothing about
 /// the next step.
@@ -80,7 +80,7 @@ Slab RunClock::next_slab(const Statistics& s) const {
   slab.length = length - count.within;
   slab.accuracy = plan_.accuracy;
   if (slab.length > kShortestPart * plan_.step) slab.most_contacts = kTooMany * most_contacts_;
-  if (const double parts = std::ceil((1 - 1e-9) * slab.length / pace.length);
+  if (const double parts = std::min(1 / kShortestPart, std::ceil((1 - 1e-9) * slab.length / pace.length));
       pace.length > 0 && !adapts() && parts > 1) {
     slab.length /= parts;
     slab.ends_step = false;
@@ -187,9 +187,10 @@ void RunClock::adapt(const Slab& slab, const LocalError& error, std::uint64_t co
     return;
   }
   whole_ = !(slab.length < pace.length);
-  if (error.rate > 0) length = std::min(length, elementary::cbrt(plan_.accuracy / error.rate));
-  length = std::min(std::clamp(length, kMostShrinkage * pace.length, kMostGrowth * pace.length), longest);
-  pace.length = std::max(rounded_down(length), plan_.shortest_step);
+  const double accurate = error.rate > 0 ? std::min(longest, elementary::cbrt(plan_.accuracy / error.rate)) : longest;
+  length = std::clamp(length, kShortestPart * accurate, accurate);
+  length = std::clamp(length, kMostShrinkage * pace.length, kMostGrowth * pace.length);
+  pace.length = std::max(rounded_down(std::min(length, longest)), plan_.shortest_step);
 }
 
 void RunClock::shorten(const Slab& slab, const StepTooLong& wanted) {
