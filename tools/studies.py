@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Common functions of energy_study.py, cost_study.py and rank_study.py: options, a deck for each run, runs, tables.
+"""Common functions of energy_study.py, cost_study.py, step_study.py and rank_study.py: options, a deck for each run, runs, tables.
 
     parser = study_parser(__doc__, "psa,cva,mcva,cdda")
     parser.add_argument(...)
@@ -51,9 +51,9 @@ def read_deck(options):
 
 
 def integrator_table(method, step):
-    """The deck's [integrator] for a method given as name[:key=value…]."""
+    """The deck's [integrator] for a method given as name[:key=value…]; a step of None is left out."""
     name, *keys = method.split(":")
-    table = {"type": name, "step": step}
+    table = {"type": name} | ({} if step is None else {"step": step})
     for key in keys:
         key, _, value = key.partition("=")
         try:

@@ -2,6 +2,7 @@
 """The studies of errors, costs and many ranks in tools/, with the real command ($CAROM)."""
 
 import csv
+import re
 import sys
 import tomllib
 
@@ -15,7 +16,10 @@ sys.path.insert(0, str(ROOT / "tools"))
 import cost_study
 import energy_study
 import rank_study
+import step_study
 import studies
+from carom_files import Trajectory
+from synthetic_run import write_run
 
 
 def test_orders_are_slopes():
@@ -39,6 +43,7 @@ def test_perturbed_starts_are_seeded_and_bounded():
 def test_integrator_tables():
     assert studies.integrator_table("cdda:order=4", 0.1) == {"type": "cdda", "step": 0.1, "order": 4}
     assert studies.integrator_table("mcva:variant=restart", 1.0)["variant"] == "restart"
+    assert studies.integrator_table("edda:accuracy=1e-4", None) == {"type": "edda", "accuracy": 1e-4}
 
 
 def rows_of(study, table, directory, deck, *options):
@@ -49,7 +54,7 @@ def rows_of(study, table, directory, deck, *options):
         return list(csv.DictReader(file))
 
 
-@pytest.mark.parametrize("study", [energy_study, cost_study, rank_study])
+@pytest.mark.parametrize("study", [energy_study, cost_study, step_study, rank_study])
 def test_a_deck_or_a_command_that_is_not_there_is_one_line(tmp_path, study):
     (tmp_path / "text.toml").write_text("no deck")
     sound, here = str(ROOT / "inputs" / "five-springs.toml"), ["-o", str(tmp_path / "out")]
@@ -84,6 +89,42 @@ def test_cost_study(tmp_path, capsys):
     passes = [float(row["passes_per_step"]) for row in rows]
     assert passes[1] > 3 * passes[0]  # each collision cuts the step of all particles
     assert passes[3] == pytest.approx(passes[2], rel=0.3)
+
+
+@needs_carom
+def test_step_study(tmp_path, capsys):
+    deck = str(ROOT / "inputs" / "five-springs.toml")
+    step_study.main([deck, "--end-time", "3", "--methods", "psa,edda", "--steps", "0.1,0.05", "--accuracies", "1e-5,1e-3", "--means", "potential",
+                     "--reference", "cdda:order=4:step=0.005", "-o", str(tmp_path)])
+    with open(tmp_path / "steps.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["method"], row["step or accuracy"]) for row in rows] == [
+        ("psa", "step 0.1"), ("psa", "step 0.05"), ("edda", "step 0.1"), ("edda", "step 0.05"), ("edda", "accuracy 1e-03"), ("edda", "accuracy 1e-05")]
+    assert [row["energy error"] == "rounding" for row in rows] == [False, False, True, True, True, True]
+    assert [int(row["steps"]) for row in rows[:4]] == [30, 60, 30, 60] and [int(row["force passes"]) for row in rows[:2]] == [31, 61]
+    for coarse, fine in (rows[2:4], rows[4:6]):
+        assert float(fine["position error"]) < 0.5 * float(coarse["position error"])
+        assert int(coarse["force passes"]) < int(fine["force passes"])
+    assert all(re.fullmatch(r"0\.\d+ \+- \d\.\d+|0\.\d+ \+- \?", row["potential"]) for row in rows)
+    assert len(capsys.readouterr().out.splitlines()) == 1 + len(rows)
+    with pytest.raises(SystemExit, match="^There is no mean height, only pressure, "):
+        step_study.main([deck, "--steps", "0.1", "--end-time", "1", "--means", "height", "-o", str(tmp_path)])
+
+
+def test_means_are_rounded_to_their_errors():
+    assert step_study.with_error(-1004.2345, 0.4712) == "-1004.23 +- 0.47"
+    assert step_study.with_error(1.14009, 0.00052) == "1.14009 +- 0.00052"
+    assert step_study.with_error(1234.5, 31.4) == "1234 +- 31"
+    assert step_study.with_error(1.23456, None) == "1.235 +- ?"
+
+
+def test_bond_lengths_are_means_over_chains(tmp_path):
+    x = np.zeros((3, 4, 3))  # two chains of two; bonds of 1 and 2, in the first frame of 5
+    x[:, 1, 0], x[:, 3, 1], x[:, 2:, 2] = [5, 1, 1], [5, 2, 2], 3
+    write_run(tmp_path / "run", np.ones(3), x=x, v=np.zeros_like(x), edges=np.full(3, 10.0), boundary=["wall"] * 3)
+    with Trajectory(tmp_path / "run") as trajectory:
+        mean, error = step_study.bond_length(trajectory, 2)
+    assert mean == pytest.approx(1.5) and error == pytest.approx(0.5)
 
 
 def test_the_model_of_ranks_takes_from_counts_what_is_in_them(capsys):
