@@ -97,11 +97,13 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
     report_ = &report;
+    const std::uint64_t counted = report.counters.sphere_sphere + report.counters.sphere_wall;
+    if (slab.index != step_) counted_ = counted;
     most_contacts_ = slab.most_contacts;
     step_ = slab.index;
     if (!system.box.contacts.elastic()) set_scales(system);
     watch_ = report.watch;
-    core_->begin_step(report.counters, report.contacts, &past_.last(), slab.length, watch_);
+    core_->begin_step(report.counters, report.contacts, &past_.last(), slab.length, watch_, counted - counted_);
     found_ = kept_;  // a step that is repeated forgets what its first attempt found
     advance(system, slab);
     kept_ = found_;
@@ -463,11 +465,12 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   Found found_, kept_;                // kept_: at the end of the last step
   int sweeps_ = 0;                    // of the last piece
   FlightEnd<D> end_;                  // of the last flight
-  std::int64_t step_ = 0;
+  std::int64_t step_ = -1;
   std::vector<Vec<D>> move_;  // change of a_ in the last sweep
   Counters* counters_ = nullptr;
   SlabReport<D>* report_ = nullptr;
   double most_contacts_ = 0;
+  std::uint64_t counted_ = 0;  // contacts of the run before this step
   SlabWatch* watch_ = nullptr;
 };
 

@@ -24,8 +24,8 @@ constexpr double kContactsOfRate = 64;
 /// Fewer contacts in a slab cost nothing that matters, however few spheres have them.
 constexpr double kFewContacts = 32;
 
-/// A slab is repeated if it has this many times the contacts that are wanted; its first flight is lost then. Contacts make
-/// no slab shorter than this part of a step: contacts that repeat without end are an error of their own.
+/// A slab is repeated if it has this many times the contacts that are wanted; its first flight is lost then. Contacts
+/// make no slab shorter than this part of a step: contacts that repeat without end are an error of their own.
 constexpr double kTooMany = 2, kShortestPart = 0x1p-6;
 
 /// The largest change of the length from slab to slab: an acceleration that happens not to change says nothing about
@@ -79,12 +79,12 @@ Slab RunClock::next_slab(const Statistics& s) const {
       slab.steps == 1 ? length_from(time_after(slab.index)) : static_cast<double>(slab.steps) * plan_.step;
   slab.length = length - count.within;
   slab.accuracy = plan_.accuracy;
-  if (slab.length > kShortestPart * plan_.step) slab.most_contacts = kTooMany * most_contacts_;
   if (const double parts = std::min(1 / kShortestPart, std::ceil((1 - 1e-9) * slab.length / pace.length));
       pace.length > 0 && !adapts() && parts > 1) {
     slab.length /= parts;
     slab.ends_step = false;
   }
+  if (slab.length > kShortestPart * plan_.step) slab.most_contacts = kTooMany * most_contacts_;
   if (!stepping_) {
     slab.contact_limit = 2 * most_collisions_;
     slab.collision_limit =

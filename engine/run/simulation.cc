@@ -168,6 +168,8 @@ void choose_step(const System<D>& system, const IntegratorInfo& info, const Plan
     step = elementary::cbrt(given.real("accuracy")) / fastest;
   }
   if (!std::isfinite(step)) step = plan.end_time ? kStepAtRest * *plan.end_time : 1;
+  if (const auto* const longest = given.find<double>("longest_step"); longest && *longest > 0)
+    step = std::min(step, *longest);
   given.set("step", step);
 }
 template void choose_step(const System<2>&, const IntegratorInfo&, const Plan&, Parameters&, double);
@@ -406,7 +408,10 @@ bool Simulation<D>::fly(Slab& slab, SlabReport<D>& report, SlabWatch& watch) {
       return false;
     } catch (const Error& e) {
       if (e.failure() != Failure::numerical) throw;
-      std::string what = no_room_text(2 * slab.length);  // squeezed spheres collide ever faster before there is no room
+      std::string what = no_room_text(
+          2 * std::max(slab.length, clock_.adapts()
+                                        ? 0
+                                        : plan_.step));  // squeezed spheres collide ever faster before there is no room
       for (const WallOptions<D>& each : system_->box.options)  // a shaken wall is farthest out a quarter and three
                                                                // quarters of a period after its phase is zero
         for (const double turns : {0.25, 0.75})
@@ -456,16 +461,21 @@ double Simulation<D>::first_step() {
 
 /// The longest step that the plan, the walls, the bath and the fastest particle allow. A bath that acts at the ends of
 /// steps moves the kinetic energy by at most a tenth of its distance from the mean at once. A particle flies no farther
-/// than a quarter of the longest edge, as in the slab core: positions would lose digits, and forces that begin on the
-/// way would be missed. If nothing moves, steps do not grow.
+/// than a quarter of the longest edge, as in the slab core, since positions would lose digits, and than a quarter of
+/// the range of each force with a cutoff, so that two particles that come near feel it in at least one step before they
+/// would have passed each other. If nothing moves, steps do not grow.
 template <int D>
 double Simulation<D>::longest_step() const {
-  constexpr double kOfRelaxation = 0.1, kOfEdge = 0.25;
+  constexpr double kOfRelaxation = 0.1, kOfLength = 0.25;
+  double shortest = system_->box.edges.maxCoeff();
+  for (const auto& term : system_->interactions)
+    if (const double range = term->bonds() ? 0 : term->reach(system_->particles.x); range > 0)
+      shortest = std::min(shortest, range);
   double squared = 0;
   for (const Vec<D>& v : system_->particles.v) squared = std::max(squared, v.squaredNorm());
   const double fastest = std::sqrt(system_->decomposition.largest(squared));
   const Bath& bath = system_->box.bath;
-  double longest = fastest > 0 ? kOfEdge * system_->box.edges.maxCoeff() / fastest : plan_.step;
+  double longest = fastest > 0 ? kOfLength * shortest / fastest : plan_.step;
   longest = std::min({longest, system_->box.longest_step(), plan_.longest_step > 0 ? plan_.longest_step : kNever});
   if (bath.type != Bath::Type::none && bath.rate > 0) longest = std::min(longest, kOfRelaxation / bath.rate);
   return longest;

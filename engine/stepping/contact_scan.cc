@@ -36,12 +36,12 @@ ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events, s
 
 template <int D>
 void ContactScan<D>::begin_step(Counters& counters, std::vector<Contact<D>>* contacts, const std::vector<Vec<D>>* a,
-                                double length, SlabWatch* watch) {
+                                double length, SlabWatch* watch, std::uint64_t already) {
   counters_ = &counters;
   contacts_ = contacts;
   watch_ = watch;
   walls_at_ = std::numeric_limits<double>::quiet_NaN();  // they may move otherwise from now on
-  events_ = 0;
+  events_ = already;
   events_at_last_cut_ = std::numeric_limits<std::uint64_t>::max();
   rest_.begin_step(a, length);
 }

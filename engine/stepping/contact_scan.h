@@ -43,11 +43,12 @@ class ContactScan {
   /// the run and must outlive the scan.
   ContactScan(const System<D>& system, std::uint64_t max_events, std::vector<Reaction<D>>& reactions);
 
-  /// Starts a step of this length: counts from zero, and logs to `contacts` (may be null). `a` (may be null, or empty)
-  /// holds the accelerations that forces cause, without reactions; it must outlive the step and may change within it.
-  /// `watch` (may be null) is called before each impulse of resolve().
+  /// Starts a step, or a part of one, of this length: counts from `already`, the contacts of its earlier parts, and
+  /// logs to `contacts` (may be null). `a` (may be null, or empty) holds the accelerations that forces cause, without
+  /// reactions; it must outlive the step and may change within it. `watch` (may be null) is called before each impulse
+  /// of resolve().
   void begin_step(Counters& counters, std::vector<Contact<D>>* contacts, const std::vector<Vec<D>>* a, double length,
-                  SlabWatch* watch = nullptr);
+                  SlabWatch* watch = nullptr, std::uint64_t already = 0);
 
   /// Applies `impulse`, which changes the velocities in `v`, to every contact that touches and approaches at x, in key
   /// order, until no contact approaches, and records which contacts rest. Returns the energy that contacts lost when

@@ -30,9 +30,9 @@ LocalError local_error(const System<D>& system, Positions<D> a, Positions<D> a_b
   for (Id i = 0; i < p.size(); ++i) {
     if (!p.owns(i)) continue;
     const double length = length_of_error(p.radius[i], distance);
-    const double change = (a[i] - a_before[i]).squaredNorm();
-    if (change <= noise * noise || change <= most * length * length) continue;
-    most = change / (length * length);
+    const double change = (a[i] - a_before[i]).squaredNorm(), relative = change / (length * length);
+    if (change <= noise * noise || !(relative > most)) continue;
+    most = relative;
     worst = i;
   }
   const double all = system.decomposition.largest(most);

@@ -232,7 +232,7 @@ FlightEnd<D> SlabCore<D>::serve() {
     }
     const std::uint32_t most = std::max(version(key.lo), pair ? version(key.hi) : 0);
     const bool too_strong = !a_.empty() && most >= kMostContactsOfParticle;
-    too_many_contacts_ = !too_strong && contacts_.size() >= max_events_;
+    too_many_contacts_ = !too_strong && already_ + contacts_.size() >= max_events_;
     if (too_strong || too_many_contacts_)
       return {.complete = false, .too_strong = too_strong, .time = key.time, .key = key};
     if (served % kEventsPerTiming != 0) {

@@ -50,12 +50,13 @@ class SlabCore {
 
   /// Starts a step; see ContactScan::begin_step. fly() calls `watch` too.
   void begin_step(Counters& counters, std::vector<Contact<D>>* contacts, const std::vector<Vec<D>>* a, double length,
-                  SlabWatch* watch = nullptr) {
+                  SlabWatch* watch = nullptr, std::uint64_t already = 0) {
+    already_ = already;
     counters_ = &counters;
     log_ = contacts;
     watch_ = watch;
     if (!reactions_.empty()) system_.decomposition.need_all();
-    scan_->begin_step(counters, contacts, a, length, watch);
+    scan_->begin_step(counters, contacts, a, length, watch, already);
   }
 
   /// Finds the pairs that may meet in a slab of this length [time], from the system's positions with velocities v,
@@ -160,7 +161,7 @@ class SlabCore {
   std::vector<Reaction<D>> reactions_;
   std::optional<ContactScan<D>> scan_;
   std::vector<Wall<D>> walls_;
-  std::uint64_t max_events_;
+  std::uint64_t max_events_, already_ = 0;
   double most_bend_;  // largest ½ a h² that is tried [length]
   Counters* counters_ = nullptr;
   std::vector<Contact<D>>* log_ = nullptr;

@@ -120,10 +120,14 @@ void set_law(System<D>& system, const Given& given) {
 template <int D>
 std::unique_ptr<Simulation<D>> make_run(std::unique_ptr<System<D>> system, const std::string& integrator, Plan plan,
                                         const Given& given) {
+  const IntegratorInfo& info = find_integrator(integrator);
   Parameters parameters = given;
-  if (!parameters.has("step")) parameters.set("step", plan.step);
-  return std::make_unique<Simulation<D>>(std::move(system), find_integrator(integrator),
-                                         make_integrator<D>(integrator, std::move(parameters)), plan);
+  if (!parameters.has("step") && plan.step > 0) parameters.set("step", plan.step);
+  choose_step(*system, info, plan, parameters);
+  parameters = completed(info.name, info.parameters, std::move(parameters));
+  if (info.adapts) set_steps(plan, parameters);
+  auto made = info.make<D>(parameters);
+  return std::make_unique<Simulation<D>>(std::move(system), info, std::move(made), plan);
 }
 
 template <int D>

@@ -17,7 +17,7 @@ std::unique_ptr<System<2>> kepler() {
   auto system = test::make_system<2>(Vec<2>{20, 20}, Boundary::open, {{10.95, 10}, {9.05, 10}},
                                      {{0, 0.5 * std::sqrt(0.1 / 1.9)}, {0, -0.5 * std::sqrt(0.1 / 1.9)}}, {0.02, 0.02},
                                      {0.5, 0.5});
-  test::add_interaction(*system, "gravity", {{"G", 1.0}});
+  test::add_interaction(*system, "gravity", {{"constant", 1.0}});
   return system;
 }
 
@@ -31,7 +31,7 @@ double energy_error(const Statistics& s) { return s.max_energy_error / s.energy_
 struct Method {
   const char* name;
   double period = 6.283185307179586;
-  std::unique_ptr<Simulation<2>> fly(const Given& given) const {
+  std::unique_ptr<Simulation<2>> fly(const test::Given& given) const {
     auto run = test::make_run<2>(kepler(), name, {.end_time = 2 * period}, given);
     run->run();
     return run;
@@ -43,31 +43,40 @@ class AdaptiveSteps : public testing::TestWithParam<const char*> {};
 TEST_P(AdaptiveSteps, AreCheaperThanFixedOnesAtTheSameErrorAndOfOrderTwo) {
   const Method method{GetParam()};
   const Vec<2> exact{1.9, 0};
-  const auto fixed = method.fly({{"step", method.period / 4096}});
+  const auto fixed = method.fly({{"step", method.period / 1536}});
   const auto adaptive = method.fly({{"accuracy", 1e-4}}), finer = method.fly({{"accuracy", 1e-4 / 64}});
   const double error = (separation(*adaptive) - exact).norm(), finer_error = (separation(*finer) - exact).norm();
   EXPECT_LT(error, (separation(*fixed) - exact).norm());
   EXPECT_LT(3 * adaptive->statistics().force_passes, fixed->statistics().force_passes);
   // Steps that are four times shorter: the error falls by 16.
-  EXPECT_NEAR(finer->statistics().steps / static_cast<double>(adaptive->statistics().steps), 4, 0.5);
+  const auto steps = [](const auto& run) { return static_cast<double>(run->statistics().steps); };
+  EXPECT_NEAR(steps(finer) / steps(adaptive), 4, 0.5);
   EXPECT_NEAR(std::log2(error / finer_error), 4, 1);
   for (const auto* run : {adaptive.get(), finer.get()}) {
     const Statistics& s = run->statistics();
-    EXPECT_LT(energy_error(s), 1e-12);
+    EXPECT_LT(energy_error(s), 1e-11);  // rounding of positions near the pericentre
     EXPECT_GT(s.longest_step, 8 * s.shortest_step);
     EXPECT_EQ(s.end_time, 2 * method.period);
     EXPECT_LE(s.local_error, 8 * 1e-4);
   }
 }
 
-TEST_P(AdaptiveSteps, RepeatAFirstStepThatIsFarTooLong) {
-  const Method method{GetParam()};
-  const auto run = method.fly({{"step", 3.0}, {"accuracy", 1e-5}});
+/// Two discs that fly until they feel each other, so that nothing foretells the force.
+TEST_P(AdaptiveSteps, AreRepeatedWhereAForceBegins) {
+  auto system =
+      test::make_system<2>(Vec<2>{100, 100}, Boundary::open, {{20, 50}, {80, 50.3}}, {{1, 0}, {-1, 0}}, {0.5, 0.5});
+  test::add_interaction(*system, "yukawa", {{"amplitude", 5.0}, {"kappa", 1.0}, {"cutoff", 4.0}});
+  auto run = test::make_run<2>(std::move(system), GetParam(), {.end_time = 60}, {{"accuracy", 1e-4}});
+  run->run();
   const Statistics& s = run->statistics();
-  EXPECT_GT(s.counters.steps_rejected, 3);
-  EXPECT_LE(s.local_error, 8e-5);
+  EXPECT_GT(s.counters.steps_rejected, 0);
+  EXPECT_EQ(s.longest_step, 1);  // a quarter of the range, at a speed of 1
+  EXPECT_LE(s.local_error, 8e-4);
   EXPECT_LT(energy_error(s), 1e-12);
-  EXPECT_LT((separation(*run) - Vec<2>{1.9, 0}).norm(), 0.05);
+  EXPECT_EQ(s.counters.sphere_sphere, 0);
+  // The discs turn round: their speeds are those at the start, but for the mean force over each step.
+  EXPECT_NEAR(run->system().particles.v[0].norm(), 1, 1e-3);
+  EXPECT_LT(run->system().particles.v[0][0], 0);
 }
 
 TEST_P(AdaptiveSteps, KeepToTheirBounds) {
@@ -87,7 +96,7 @@ TEST_P(AdaptiveSteps, KeepToTheirBounds) {
 
 TEST_P(AdaptiveSteps, StopAndGoOnWithTheSameBits) {
   const Method method{GetParam()};
-  const Given given{{"step", 3.0}, {"accuracy", 1e-5}};
+  const test::Given given{{"accuracy", 1e-5}};
   const auto whole = method.fly(given);
   auto halves = test::make_run<2>(kepler(), method.name, {.end_time = 2 * method.period}, given);
   int looks = 0;
@@ -120,16 +129,15 @@ TEST(StepsOfTheirOwn, AreLimitedByShakenWallsAndBaths) {
   EXPECT_GT(longest([](auto&) {}), 4);
   EXPECT_EQ(longest([](auto& system) { system.box.add({.name = "y-", .amplitude = 0.1, .frequency = 0.4}); }), 0.25);
   EXPECT_EQ(longest([](auto& system) {
-              system.box.bath = {.type = Bath::Type::andersen, .rate = 0.2, .temperature = 1, .last_temperature = 1};
+              system.box.bath = {.type = Bath::Type::andersen, .temperature = 1, .last_temperature = 1, .rate = 0.2};
             }),
             0.5);
 }
 
 TEST(StepsOfTheirOwn, AreRefusedByMethodsWhoseEnergyErrorWouldGrow) {
   for (const char* method : {"psa", "cva", "mcva", "verlet"}) {
-    Simulation<2>::Hooks hooks;
     try {
-      const auto run = test::make_run<2>(kepler(), method, {.step = 0.1, .steps = 1, .accuracy = 1e-4});
+      const auto run = test::make_run<2>(kepler(), method, {.step = 0.1, .accuracy = 1e-4, .steps = 1});
       FAIL() << method;
     } catch (const Error& error) {
       EXPECT_EQ(error.failure(), Failure::deck);
@@ -140,7 +148,7 @@ TEST(StepsOfTheirOwn, AreRefusedByMethodsWhoseEnergyErrorWouldGrow) {
 
 TEST(StepsOfTheirOwn, BeginWithoutAMotion) {
   auto system = test::make_system<2>(Vec<2>{10, 10}, Boundary::wall, {{3, 5}, {7, 5}}, {{0, 0}, {0, 0}}, {0.5, 0.5});
-  test::add_interaction(*system, "gravity", {{"G", 1.0}});
+  test::add_interaction(*system, "gravity", {{"constant", 1.0}});
   auto run = test::make_run<2>(std::move(system), "edda", {.end_time = 20});
   run->run();
   EXPECT_GT(run->statistics().counters.sphere_sphere, 0);
@@ -148,11 +156,10 @@ TEST(StepsOfTheirOwn, BeginWithoutAMotion) {
   EXPECT_LE(run->statistics().local_error, 8e-4);
 }
 
-/// A fluid of hard discs in a weak field, in steps of several mean free times.
+/// A fluid of hard discs, in steps of several mean free times.
 TEST(FixedSteps, AreDividedIfSpheresCollideOftenInThem) {
   const auto fly = [](double step) {
     auto system = test::hard_spheres<2>(6, 0.5);
-    test::add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0.01, 0.0}}});
     auto run = test::make_run<2>(std::move(system), "edda", {.step = step, .end_time = 8});
     run->run();
     return run;
