@@ -21,6 +21,10 @@ constexpr double kLongestEpoch = 1e9;
 /// has more in a slab, of the last slab.
 constexpr double kContactsOfRate = 64;
 
+/// The mean free times for which contacts are expected as in a gas: a crystal that melts has its first contacts later.
+/// Where forces keep spheres apart, contacts stay rarer, and fixed steps need not be divided.
+constexpr double kFreeTimes = 2;
+
 /// Fewer contacts in a slab cost nothing that matters, however few spheres have them.
 constexpr double kFewContacts = 32;
 
@@ -163,7 +167,7 @@ void RunClock::lengthen(double steps) {
 
 void RunClock::expect(double most_contacts, double contacts, double longest) {
   most_contacts_ = std::max(most_contacts * particles_, kFewContacts);
-  pace = {.expected = contacts, .before = particles_};
+  pace = {.expected = contacts, .before = kFreeTimes / contacts};
   const double length = std::min(length_with_contacts(), longest);
   pace.length = std::isfinite(length) ? length : 0;
 }
@@ -180,7 +184,7 @@ void RunClock::adapt(const Slab& slab, const LocalError& error, std::uint64_t co
   const double kept = std::min(1.0, kContactsOfRate / (pace.contacts + happened));
   pace.contacts = kept * pace.contacts + happened;
   pace.time = kept * pace.time + slab.length;
-  if (pace.before -= happened; pace.before <= 0) pace.expected = pace.before = 0;
+  if (pace.before -= slab.length; !(pace.before > 0)) pace.expected = pace.before = 0;
   double length = length_with_contacts();
   if (!adapts()) {
     pace.length = std::isfinite(length) ? length : 0;

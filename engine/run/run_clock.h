@@ -39,8 +39,8 @@ struct Pace {
   double length = 0;  ///< the longest of the next slab; 0: that of a step [time]
   /// Recent contacts (of two spheres: two) and the time in which they happened.
   double contacts = 0, time = 0;
-  double expected = 0;  ///< of a sphere in a unit of time; 0: most spheres have had contacts, which tell more
-  double before = 0;    ///< contacts until then
+  double expected = 0;  ///< of a sphere in a unit of time; 0: the contacts that happened tell more
+  double before = 0;    ///< time until then
 };
 
 class RunClock {

@@ -596,7 +596,7 @@ Scene<2> stiff(int cells, double packing_fraction) {
 }
 /// Neighbours bounce so often in a step that the order of some collisions changes between sweeps.
 TEST(Decomposition, ParticlesThatAreFrozen) {
-  const Counters c = compare<2>(stiff(40, 0.74), "edda", 0.04, 12, 300).counters;
+  const Counters c = compare<2>(stiff(40, 0.74), "edda", 0.04, 24, 300).counters;
   EXPECT_GT(c.frozen, 0u);
   EXPECT_EQ(c.slabs_by_all, 0u);
 }

@@ -158,17 +158,17 @@ TEST(RunClock, AStepThatWasTooLongIsRepeatedWithALengthOfItsOwn) {
 }
 
 TEST(RunClock, FixedStepsAreDividedByTheNumberOfContacts) {
-  Stroll run({.step = 1, .steps = 3}, 10, 30);  // of each of ten particles
-  EXPECT_EQ(run.step(0, 9), 1.0 / 3);           // 300 are expected in a unit of time, 100 wanted
+  Stroll run({.step = 1, .steps = 30}, 10, 20);  // of each of ten particles, as long as 2/20 units of time
+  EXPECT_EQ(run.step(0, 1), 0.5);                // 200 are expected in a unit of time, 100 wanted
   EXPECT_EQ(run.complete, 0);
-  EXPECT_NEAR(run.step(0, 1), 1.0 / 3, 1e-15);  // still expected
   EXPECT_EQ(run.s.steps, 0);
-  run.step(0, 60);
-  EXPECT_NEAR(run.complete, 1, 1e-15);
+  EXPECT_EQ(run.step(0, 60), 0.5);
+  EXPECT_EQ(run.complete, 1);
   EXPECT_EQ(run.s.steps, 1);
-  EXPECT_EQ(run.s.end_time, 1);
-  EXPECT_EQ(run.step(0, 70), 1);  // 70 in a unit of time
+  EXPECT_EQ(run.step(0, 70), 1);  // 61 in a unit of time
   EXPECT_EQ(run.s.steps, 2);
+  for (int n = 0; n < 3; ++n) run.step(0, 350);
+  EXPECT_NEAR(run.step(0, 90), 1.0 / 4, 1e-15);
 }
 
 }  // namespace
