@@ -17,14 +17,14 @@ struct Counters : ContactTally {
   std::uint64_t pieces = 0;  ///< edda: pieces in which steps were solved; more than the steps if any step was cut
   std::uint64_t slabs_halved = 0;
   std::uint64_t steps_rejected = 0;  ///< steps repeated because they were not accurate enough
-  std::uint64_t fallbacks = 0;     ///< mcva: plain elastic impulses; edda: searches for the highest frequency
-  std::uint64_t frozen = 0;        ///< edda: particles that kept the acceleration of an earlier sweep
-  double folded = 0;               ///< edda: Σ|r|, the energy errors folded into velocities [energy]
-  std::uint64_t divisions = 0;     ///< times that particles were divided among ranks (methods with forces)
-  std::uint64_t slabs_again = 0;   ///< slabs repeated with more ghosts or all particles
-  std::uint64_t slabs_by_all = 0;  ///< slabs repeated with all particles
-  EventCounts events;              ///< counts of the event core at the end of the last slab; 0 if the method has none
-  WindowCounts windows;            ///< counts of this rank's subdomain; 0 if there is only one subdomain
+  std::uint64_t fallbacks = 0;       ///< mcva: plain elastic impulses; edda: searches for the highest frequency
+  std::uint64_t frozen = 0;          ///< edda: particles that kept the acceleration of an earlier sweep
+  double folded = 0;                 ///< edda: Σ|r|, the energy errors folded into velocities [energy]
+  std::uint64_t divisions = 0;       ///< times that particles were divided among ranks (methods with forces)
+  std::uint64_t slabs_again = 0;     ///< slabs repeated with more ghosts or all particles
+  std::uint64_t slabs_by_all = 0;    ///< slabs repeated with all particles
+  EventCounts events;                ///< counts of the event core at the end of the last slab; 0 if the method has none
+  WindowCounts windows;              ///< counts of this rank's subdomain; 0 if there is only one subdomain
 
   struct Seconds {
     double predict = 0, queue = 0, collide = 0, force = 0, sweep = 0, communicate = 0, output = 0;
@@ -32,8 +32,8 @@ struct Counters : ContactTally {
 
   void archive(Archive& archive) {
     ContactTally::archive(archive);
-    archive(force_passes, sweeps, pieces, slabs_halved, steps_rejected, fallbacks, frozen, folded, divisions, slabs_again, slabs_by_all,
-            events, windows, seconds);
+    archive(force_passes, sweeps, pieces, slabs_halved, steps_rejected, fallbacks, frozen, folded, divisions,
+            slabs_again, slabs_by_all, events, windows, seconds);
   }
 };
 

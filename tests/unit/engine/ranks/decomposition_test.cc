@@ -546,9 +546,8 @@ TEST(Decomposition, PilesDoNotOverlap) {
     std::string method;
     double step;
   };
-  for (const Case& c :
-       {Case{meeting, "cva", 0.005}, Case{column, "edda", 0.018}, Case{column, "edda", 0.02}, Case{layers, "edda", 0.02},
-        Case{layers, "cdda", 0.02}, Case{layers, "psa", 0.02}}) {
+  for (const Case& c : {Case{meeting, "cva", 0.005}, Case{column, "edda", 0.018}, Case{column, "edda", 0.02},
+                        Case{layers, "edda", 0.02}, Case{layers, "cdda", 0.02}, Case{layers, "psa", 0.02}}) {
     SCOPED_TRACE(c.method + " " + std::to_string(c.step));
     const auto run = [&](Communicator* ranks) {
       auto system = c.scene();
