@@ -51,7 +51,7 @@ DECK_ERRORS = {
     "key that is no more": (
         changed('type = "cdda"', 'type = "edda"\nadaptive = 1e-6'),
         24, ["unknown key 'adaptive' in [integrator]", "take a shorter 'step'"]),
-    "missing key": (changed("step = 0.01\n", ""), 22, ["missing key 'step' in [integrator]", "positive number"]),
+    "missing key": (changed('type = "cdda"\nstep = 0.01\n', 'type = "psa"\n'), 22, ["missing key 'step' in [integrator]", "positive number"]),
     "missing position and count": (
         changed("position = [[2.0, 5.0], [5.0, 5.0]]\nvelocity = [[1.0, 0.0], [0.0, 0.0]]\n", ""),
         9, ["missing key 'position' or 'count'"]),

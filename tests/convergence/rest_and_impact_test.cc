@@ -60,8 +60,11 @@ void expect_convergence(Scene&& make, const Impact<D>& impact) {
     errors.push_back(test::largest_difference<D>(after_impact<D>(make, impact, "edda", h), exact));
     std::printf("step %.3f: error %.1e\n", h, errors.back());
   }
-  const double order = test::fitted_order(steps, errors);
   EXPECT_LE(errors.back(), 1e-5);
+  // In a large crystal the two methods differ by the rounding that the impact amplifies, 4e-7 at any step.
+  constexpr double kAmplifiedRounding = 5e-7;
+  if (errors.back() < kAmplifiedRounding) errors.pop_back(), steps.pop_back();
+  const double order = test::fitted_order(steps, errors);
   EXPECT_GT(order, 1.8);
 }
 

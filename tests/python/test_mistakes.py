@@ -130,7 +130,7 @@ MISTAKES = {
                                 lambda: carom.Simulation(box=[12, 6]).add_force("gravity", constant=1.0)),
     "unknown integrator": (USAGE, "unknown integrator 'leapfrog'; give one of: free-flight, ",
                            lambda: five_springs().integrator("leapfrog", step=0.1)),
-    "no step": (USAGE, "edda: missing parameter 'step'; give it: length of one step", lambda: five_springs().integrator("edda")),
+    "no step": (USAGE, "psa: missing parameter 'step'; give it: length of one step", lambda: five_springs().integrator("psa")),
     "negative step": (USAGE, "edda: 'step' must be positive (is -0.01)", lambda: five_springs().integrator("edda", step=-0.01)),
     "step that is nan": (USAGE, "'step' must be finite", lambda: five_springs().integrator("edda", step=NAN)),
     "class for a name": (USAGE, "the first argument is <class 'int'>; give a name", lambda: five_springs().integrator(int)),

@@ -51,7 +51,7 @@ def test_everything_is_described():
     names = [name for line in carom.describe().splitlines() for name in line.split(": ")[1].split(", ")]
     assert "edda" in names and "yukawa" in names and "periodic" in names
     assert all(carom.describe(name).startswith(name) for name in names)
-    assert "step (float, time, must be given): length of one step" in carom.describe("edda")
+    assert "step (float, time, must be given): length of one step" in carom.describe("psa")
 
 
 def test_the_first_example_of_the_readme(tmp_path):

@@ -125,7 +125,7 @@ std::unique_ptr<Simulation<D>> make_run(std::unique_ptr<System<D>> system, const
   if (!parameters.has("step") && plan.step > 0) parameters.set("step", plan.step);
   choose_step(*system, info, plan, parameters);
   parameters = completed(info.name, info.parameters, std::move(parameters));
-  if (info.adapts) set_steps(plan, parameters);
+  if (info.adapts && plan.longest_step == 0 && plan.accuracy == 0) set_steps(plan, parameters);
   auto made = info.make<D>(parameters);
   return std::make_unique<Simulation<D>>(std::move(system), info, std::move(made), plan);
 }
