@@ -81,7 +81,7 @@ double contact_time(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double si
   if (!touching) {  // most pairs are too far apart: compare the distance with the path length
     const double path = time_left * (v.norm() + 0.5 * time_left * a.norm());
     if (c0 > 0 && path * (path + 2 * sigma) < c0) return kNever;
-    // Of the others, most pass each other: the parabola is never farther from the straight path than this bend.
+    // Most other pairs pass each other: their parabola is never farther from the straight path than `bend`.
     const double bend = (0.5 + kBendMargin) * time_left * time_left * a.norm();
     const double closest = b < 0 ? std::min(time_left, -b / v.squaredNorm()) : 0.0;
     const double passing = (1 + kBendMargin) * sigma + bend;

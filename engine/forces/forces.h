@@ -10,17 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "engine/base/elementary.h"
 #include "engine/laws/counters.h"
 #include "engine/ranks/system.h"
 
 namespace carom {
-
-/// The mean distance (V/N)^(1/D) [length].
-template <int D>
-double mean_distance(const System<D>& system) {
-  return elementary::pow(system.box.volume() / static_cast<double>(std::max<std::size_t>(1, system.size())), 1.0 / D);
-}
 
 /// Computes the quanta from parameters, masses, charges and box. Collective.
 template <int D>
@@ -153,6 +146,18 @@ double sum_over_all(const System<D>& system, auto&& term) {
   for (Id i = 0; i < system.particles.size(); ++i)
     if (system.particles.owns(i)) own.add(term(i));
   return system.decomposition.sum(own.sum()).value();
+}
+
+/// The velocity of the centre of mass if particles can move relative to it without changing it: if there are several,
+/// and momentum is conserved; else zero. Collective.
+template <int D>
+Vec<D> velocity_of_centre(const System<D>& system) {
+  Vec<D> centre = Vec<D>::Zero();
+  if (system.size() < 2 || !system.keeps_momentum()) return centre;
+  const auto& p = system.particles;
+  const double mass = sum_over_all<D>(system, [&](Id i) { return p.mass[i]; });
+  for (int k = 0; k < D; ++k) centre[k] = sum_over_all<D>(system, [&](Id i) { return p.mass[i] * p.v[i][k]; }) / mass;
+  return centre;
 }
 
 /// Exact sums and extremes over all particles.

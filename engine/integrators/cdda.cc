@@ -70,7 +70,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
       const double wanted = std::min(time_left, longest), tau = find_piece(p, wanted);
       if (tau == 0) {  // no convergence
         longest = 0.5 * wanted;
-        if (slab.accuracy > 0) throw StepTooLong{.length = 0.5 * slab.length, .id = 0};
+        if (slab.accuracy > 0) throw StepTooLong{.length = 0.5 * slab.length};
         ++report.counters.slabs_halved;
         if (longest * kMostPieces < slab.length)
           throw Error(
@@ -122,17 +122,11 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     if (system.box.contacts.elastic()) owed_ = 0;  // contacts without a law lose rounding only
     if (owed_ == 0) return;
     auto& p = system.particles;
-    Vec<D> centre = Vec<D>::Zero();
-    double mass = 0, kinetic = 0;
-    for (Id i = 0; i < p.size(); ++i) {
-      mass += moving_mass(p.mass[i]);
-      centre += moving_mass(p.mass[i]) * p.v[i];
-    }
-    // As in edda: particles move relative to a centre of mass that has a constant velocity, or to the box.
-    centre *= system.size() > 1 && system.keeps_momentum() ? 1 / mass : 0.0;
+    const Vec<D> centre = velocity_of_centre(system);
+    double kinetic = 0;
     for (Id i = 0; i < p.size(); ++i) kinetic += 0.5 * moving_mass(p.mass[i]) * (p.v[i] - centre).squaredNorm();
     if (!(std::abs(owed_) <= kMostFolded * kinetic)) {
-      if (owed_ > 0 && !system.box.contacts.elastic()) counters_->dissipated.add(std::exchange(owed_, 0));
+      if (owed_ > 0) counters_->dissipated.add(std::exchange(owed_, 0));
       return;
     }
     const double share = owed_ / kinetic, stretch = share / (1 + std::sqrt(1 + share));
@@ -212,22 +206,21 @@ class CollisionDiscreteDerivative : public Integrator<D> {
 }  // namespace
 
 IntegratorInfo cdda() {
-  std::vector<Parameter> parameters = parameter::adaptive_steps();
-  parameters.push_back({.name = "order",
-                        .type = Parameter::Type::integer,
-                        .fallback = "2",
-                        .unit = "-",
-                        .meaning = "2: the plain discrete-gradient step; 4: composed of five (about five times the "
-                                   "cost; `accuracy` then chooses shorter steps than it must)",
-                        .range = Parameter::Range::positive,
-                        .choices = {"2", "4"}});
-  parameters.push_back(parameter::max_events_per_step());
   return {
       .name = "cdda",
       .title = "Collision Discrete Derivative Algorithm",
       .order = "2 or 4",
       .conserves = "energy and linear momentum to rounding, for any step",
-      .parameters = std::move(parameters),
+      .parameters = parameter::with_adaptive_steps(
+          {{.name = "order",
+            .type = Parameter::Type::integer,
+            .fallback = "2",
+            .unit = "-",
+            .meaning =
+                "2: the plain discrete-gradient step; 4: composed of five (about five times the cost; `accuracy` "
+                "then chooses shorter steps than it must)",
+            .range = Parameter::Range::positive,
+            .choices = {"2", "4"}}}),
       .documentation =
           "Discrete-gradient steps, cut for all particles at each collision so that every piece ends in contact. "
           "Each piece conserves the energy exactly, whatever its length. Each collision costs a few implicit solves of "

@@ -72,7 +72,8 @@ bool DiscreteGradient<D>::substep(double tau, std::size_t stage, ContactScan<D>&
       change = std::max(change, (next_[i] - mean_[i]).squaredNorm());
       speed = std::max({speed, next_[i].squaredNorm(), v_[i].squaredNorm()});
     }
-    // At rest the velocities are what is left of the kicks by reactions and forces, whose rounding they have.
+    // Velocities of spheres at rest are differences of the kicks by reactions and by forces, and their rounding is that
+    // of the kicks.
     for (const auto& contact : scan.resting()) {
       const double lightest = contact.key.kind == EventKind::pair ? std::min(mass[contact.key.lo], mass[contact.key.hi])
                                                                   : mass[contact.key.lo];

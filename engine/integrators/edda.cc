@@ -49,7 +49,7 @@ constexpr std::uint64_t kPartialUpdate = 5;  // if fewer than one particle in 5 
 constexpr int kSwapsBeforeFreezing = 3;   // a particle is frozen at the next swap; swaps count once freezing may begin
 constexpr double kFrequencyMargin = 1.1;  // for frequencies above the estimate
 constexpr std::int64_t kStepsPerFrequency = 1000;  // steps for which the estimate is used
-/// Of a sphere in a slab: the cost of a unit of time is least there, in the Yukawa fluid (README.md).
+/// The number of contacts of a sphere in a slab at which a unit of time of the Yukawa fluid costs least (README.md).
 constexpr double kMostContacts = 0.5;
 constexpr std::int64_t kStepsPerEstimate = 16;  // steps of fixed length for one estimate of the local error
 constexpr double kMostFolded = 0.1;             // of the kinetic energy
@@ -86,12 +86,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     system.fields.add_value("edda found", kept_);
     system.fields.add_value("edda owed", owed_);
     set_scales(system);
-    const auto sum = [&](auto&& term) { return sum_over_all<D>(system, term); };
-    const double mass = sum([&](Id i) { return p.mass[i]; });
-    // Whether particles can move relative to a centre of mass with a constant velocity.
-    const bool free = system.size() > 1 && system.keeps_momentum();
-    for (int k = 0; k < D; ++k)
-      scales_.centre[k] = free ? sum([&](Id i) { return p.mass[i] * p.v[i][k]; }) / mass : 0.0;
+    const Vec<D> centre = velocity_of_centre(system);
+    std::ranges::copy(centre, scales_.centre.begin());
   }
 
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
@@ -171,8 +167,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         found_.touching = found_.touching || until_contact == kNever;
         continue;
       }
-      if (slab.accuracy > 0 && !resting() && !(end_.time > 0))
-        throw StepTooLong{.length = 0.5 * slab.length, .id = most_accelerated_id(system)};
+      if (slab.accuracy > 0 && !resting() && !(end_.time > 0)) throw StepTooLong{.length = 0.5 * slab.length};
       ++counters_->slabs_halved;
       longest = 0.5 * piece;
       found_.converged = 0;
@@ -192,7 +187,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       if (longest * kMostPieces < slab.length)
         throw Error(Failure::numerical, "the sweeps do not converge even in " + std::to_string(kMostPieces) +
                                             " pieces; the forces, strongest on particle " +
-                                            std::to_string(most_accelerated_id(system)) +
+                                            std::to_string(p.id_of(most_accelerated())) +
                                             ", are not finite or far too stiff for step = " + short_text(slab.length) +
                                             "; use a smaller integrator.step");
     }
@@ -310,10 +305,9 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         swaps_[i] = kSwapsBeforeFreezing + 1;
   }
 
-  /// Call this if all ranks have all particles.
-  Id most_accelerated_id(const System<D>& system) const {
+  Id most_accelerated() const {
     const auto most = std::ranges::max_element(a_, {}, [](const Vec<D>& a) { return finite(a.squaredNorm()); });
-    return system.particles.id_of(static_cast<Id>(most - a_.begin()));
+    return static_cast<Id>(most - a_.begin());
   }
 
   Vec<D> centre() const { return Vec<D>(scales_.centre.data()); }
@@ -477,16 +471,6 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
 }  // namespace
 
 IntegratorInfo edda() {
-  std::vector<Parameter> parameters = parameter::adaptive_steps();
-  parameters.push_back({.name = "tolerance",
-                        .type = Parameter::Type::real,
-                        .fallback = "1e-10",
-                        .unit = "-",
-                        .meaning = "largest residual of a step's impulses, as a velocity relative to the root mean "
-                                   "square velocity at the start; the energy stays exact: the missing energy is folded "
-                                   "into the velocities (energy.folded of summary.json); 0: rounding",
-                        .range = Parameter::Range::non_negative});
-  parameters.push_back(parameter::max_events_per_step());
   return {
       .name = "edda",
       .title = "Event-Driven Discrete gradients",
@@ -494,7 +478,15 @@ IntegratorInfo edda() {
       .conserves =
           "energy and linear momentum to rounding, for any step; angular momentum to the tolerance in slabs "
           "without collisions",
-      .parameters = std::move(parameters),
+      .parameters = parameter::with_adaptive_steps(
+          {{.name = "tolerance",
+            .type = Parameter::Type::real,
+            .fallback = "1e-10",
+            .unit = "-",
+            .meaning = "largest residual of a step's impulses, as a velocity relative to the root mean square velocity "
+                       "at the start; the energy stays exact: the missing energy is folded into the velocities "
+                       "(energy.folded of summary.json); 0: rounding",
+            .range = Parameter::Range::non_negative}}),
       .documentation =
           "Each particle moves under a constant acceleration of its own over the step, through all its collisions; the "
           "accelerations are the discrete gradient between the step's two ends. Sweeps find them; each sweep costs a "

@@ -14,6 +14,7 @@
 #include "engine/laws/contact_log.h"
 #include "engine/laws/counters.h"
 #include "engine/ranks/system.h"
+#include "engine/stepping/local_error.h"
 #include "engine/stepping/slab_watch.h"
 
 namespace carom {
@@ -124,8 +125,9 @@ std::unique_ptr<Integrator<D>> make_integrator(std::string_view name, Parameters
 namespace parameter {
 Parameter step();
 Parameter longest_step();
-/// The keys of methods that choose their steps: an optional first `step`, `accuracy`, `shortest_step`, `longest_step`.
-std::vector<Parameter> adaptive_steps();
+/// The parameters of a method that may choose its steps: an optional first `step`, `accuracy`, `shortest_step`,
+/// `longest_step`, those of its own, and max_events_per_step().
+std::vector<Parameter> with_adaptive_steps(std::vector<Parameter> own);
 Parameter max_events_per_step();
 }  // namespace parameter
 

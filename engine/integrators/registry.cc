@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/integrators/registry.h"
 
+#include <algorithm>
+#include <iterator>
+
 namespace carom {
 
 const std::vector<IntegratorInfo>& integrators() {
@@ -51,7 +54,7 @@ Parameter longest_step() {
           .range = Parameter::Range::non_negative};
 }
 
-std::vector<Parameter> adaptive_steps() {
+std::vector<Parameter> with_adaptive_steps(std::vector<Parameter> own) {
   Parameter first = step(), longest = longest_step();
   first.fallback = "none";
   first.meaning =
@@ -61,23 +64,27 @@ std::vector<Parameter> adaptive_steps() {
       "the longest step that the method chooses; 0: any. With fixed steps: as the particles of a gas with inelastic "
       "contacts become slower, its steps become longer, so that a path of thermal speed keeps its length, up to this; "
       "whole multiples of step; 0: all are of length step";
-  return {first,
-          {.name = "accuracy",
-           .type = Parameter::Type::real,
-           .fallback = "none",
-           .unit = "-",
-           .meaning =
-               "the method chooses its steps so that the position of no particle is wrong by much more than this in "
-               "one step, relative to the diameter of the particle (of a point: to the mean distance); 0: fixed steps; "
-               "default: 1e-4 if no step is given, else 0",
-           .range = Parameter::Range::non_negative},
-          {.name = "shortest_step",
-           .type = Parameter::Type::real,
-           .fallback = "0",
-           .unit = "time",
-           .meaning = "the run ends with an error if `accuracy` needs a shorter step; 0: any",
-           .range = Parameter::Range::non_negative},
-          longest};
+  std::vector<Parameter> all = {
+      first,
+      {.name = "accuracy",
+       .type = Parameter::Type::real,
+       .fallback = "none",
+       .unit = "-",
+       .meaning =
+           "the method chooses its steps so that the position of no particle is wrong by much more than this in "
+           "one step, relative to the diameter of the particle (of a point: to the mean distance); 0: fixed steps; "
+           "default: 1e-4 if no step is given, else 0",
+       .range = Parameter::Range::non_negative},
+      {.name = "shortest_step",
+       .type = Parameter::Type::real,
+       .fallback = "0",
+       .unit = "time",
+       .meaning = "the run ends with an error if `accuracy` needs a shorter step; 0: any",
+       .range = Parameter::Range::non_negative},
+      longest};
+  std::ranges::move(own, std::back_inserter(all));
+  all.push_back(max_events_per_step());
+  return all;
 }
 
 Parameter max_events_per_step() {

@@ -27,13 +27,11 @@ const std::vector<Parameter>& contact_parameters() {
         {"friction", real, "none", "-",
          "the largest tangential impulse over the normal one (Coulomb); no limit where absent", Range::non_negative},
         {"rest_speed", real, "none", "length/time",
-         "slower approaches end at rest in methods with steps and are elastic in free flight; where absent, 1e-8 of "
+         "slower approaches end at rest in methods with steps and are elastic in free flight. Where absent: 1e-8 of "
          "the "
-         "thermal speed or, if this is faster, in methods with steps the speed sqrt(1e-4 a sigma) of a fall from half "
-         "of "
-         "1e-4 contact distances sigma, where a is the larger acceleration that forces give to one of the partners, "
-         "less "
-         "that at which they part the two",
+         "thermal speed; in methods with steps the speed sqrt(1e-4 a sigma) of a fall from half of 1e-4 contact "
+         "distances sigma if that is faster, where a is the larger of the accelerations that forces give to the two "
+         "partners, less the acceleration at which forces part them",
          Range::non_negative}};
   }();
   return all;

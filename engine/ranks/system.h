@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/base/elementary.h"
 #include "engine/base/fields.h"
 #include "engine/base/particles.h"
 #include "engine/laws/box.h"
@@ -81,5 +82,11 @@ struct System {
  private:
   std::size_t fixed_ = 0;
 };
+
+/// The mean distance (V/N)^(1/D) [length].
+template <int D>
+double mean_distance(const System<D>& system) {
+  return elementary::pow(system.box.volume() / static_cast<double>(std::max<std::size_t>(1, system.size())), 1.0 / D);
+}
 
 }  // namespace carom

@@ -41,11 +41,7 @@ void rescale(System<D>& system, std::int64_t slab, double time, double length, C
   constexpr std::uint64_t kBlocksOfSlab = 1024;  // a gamma deviate is rejected with a probability below 0.05
   const Bath& bath = system.box.bath;
   auto& p = system.particles;
-  Vec<D> centre = Vec<D>::Zero();
-  if (system.size() > 1 && system.keeps_momentum()) {
-    const double mass = sum_over_all<D>(system, [&](Id i) { return p.mass[i]; });
-    for (int k = 0; k < D; ++k) centre[k] = sum_over_all<D>(system, [&](Id i) { return p.mass[i] * p.v[i][k]; }) / mass;
-  }
+  const Vec<D> centre = velocity_of_centre(system);
   const double before = kinetic_energy<D>(system, Vec<D>::Zero()), kinetic = kinetic_energy(system, centre);
   if (!(kinetic > 0)) {
     if (kinetic == 0 && bath.temperature_at(time) > 0 &&

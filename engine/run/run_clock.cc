@@ -83,12 +83,13 @@ Slab RunClock::next_slab(const Statistics& s) const {
       slab.steps == 1 ? length_from(time_after(slab.index)) : static_cast<double>(slab.steps) * plan_.step;
   slab.length = length - count.within;
   slab.accuracy = plan_.accuracy;
-  if (const double parts = std::min(1 / kShortestPart, std::ceil((1 - 1e-9) * slab.length / pace.length));
-      pace.length > 0 && !adapts() && parts > 1) {
-    slab.length /= parts;
-    slab.ends_step = false;
+  if (!adapts() && pace.length > 0) {
+    const double parts = std::min(1 / kShortestPart, std::ceil((1 - 1e-9) * slab.length / pace.length));
+    slab.ends_step = !(parts > 1);
+    if (!slab.ends_step) slab.length /= parts;
   }
-  if (slab.length > kShortestPart * plan_.step) slab.most_contacts = kTooMany * most_contacts_;
+  if (slab.length > std::max(kShortestPart * plan_.step, plan_.shortest_step))
+    slab.most_contacts = kTooMany * most_contacts_;
   if (!stepping_) {
     slab.contact_limit = 2 * most_collisions_;
     slab.collision_limit =
@@ -198,16 +199,17 @@ void RunClock::adapt(const Slab& slab, const LocalError& error, std::uint64_t co
 }
 
 void RunClock::shorten(const Slab& slab, const StepTooLong& wanted) {
-  const double length = wanted.id ? std::max(wanted.length, plan_.shortest_step) : wanted.length;
+  const double length = std::max(wanted.length, plan_.shortest_step);
   if (!(length < slab.length) || !(slab.start + length > slab.start))
-    throw Error(Failure::numerical, "a step of " + short_text(slab.length) + " changes the acceleration of particle " +
-                                        std::to_string(wanted.id.value_or(0)) + " too much for an accuracy of " +
-                                        short_text(plan_.accuracy) +
-                                        (length < slab.length ? ", and a shorter one does not change the time; give a "
-                                                                "larger integrator.accuracy"
-                                                              : ", and shortest_step allows no shorter one; give a "
-                                                                "shorter integrator.shortest_step, or a larger "
-                                                                "integrator.accuracy"));
+    throw Error(Failure::numerical,
+                "a step of " + short_text(slab.length) +
+                    (wanted.id ? " changes the acceleration of particle " + std::to_string(*wanted.id) +
+                                     " too much for an accuracy of " + short_text(plan_.accuracy)
+                               : std::string(" is too long for the forces, which are not finite or far too stiff")) +
+                    (length < slab.length
+                         ? ", and a shorter one does not change the time; give a larger integrator.accuracy"
+                         : ", and shortest_step allows no shorter one; give a shorter integrator.shortest_step, or a "
+                           "larger integrator.accuracy"));
   pace.length = length;
 }
 

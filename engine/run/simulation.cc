@@ -5,16 +5,14 @@
 #include <cmath>
 #include <limits>
 
-#include "engine/base/elementary.h"
 #include "engine/base/error.h"
 #include "engine/forces/forces.h"
 #include "engine/laws/wall_options.h"
-#include "engine/ranks/id_blocks.h"
 #include "engine/run/baths.h"
 #include "engine/run/monitor.h"
+#include "engine/run/step_choice.h"
 #include "engine/setup/epoch.h"
 #include "engine/setup/initial_state.h"
-#include "engine/stepping/local_error.h"
 
 namespace carom {
 
@@ -30,13 +28,6 @@ constexpr double kMostCells = 0x1p52;
 constexpr double kMostOscillations = 1e9;
 /// Flight distance without any pair collision after which a run in an open box ends [longest edge].
 constexpr double kFarApart = 1e4;
-constexpr double kNever = std::numeric_limits<double>::infinity();
-/// Plan::accuracy if no step is given.
-constexpr double kDefaultAccuracy = 1e-4;
-/// Plan::step if no particle moves at the start and no step is given, relative to the end of the run. The forces at the
-/// start make the first step shorter.
-constexpr double kStepAtRest = 1e-3;
-
 template <int D>
 double largest_radius(const System<D>& system) {
   const auto radii = system.decomposition.radii();
@@ -151,40 +142,6 @@ EndlessRun endless(const Plan& plan, const IntegratorInfo* info, bool ramp) {
   return {};
 }
 
-template <int D>
-void choose_step(const System<D>& system, const IntegratorInfo& info, const Plan& plan, Parameters& given,
-                 double step) {
-  if (!info.stepping) return choose_epoch(system, given, step);
-  if (!info.adapts || given.has("step")) return;
-  if (!given.has("accuracy")) given.set("accuracy", kDefaultAccuracy);
-  if (step == 0) {
-    Communicator alone;
-    const auto& p = system.particles;
-    const double fastest = accumulated_in_order(
-        system.decomposition.others() ? *system.decomposition.others() : alone, 0.0, [&](double& most) {
-          for (Id i = 0; i < p.size(); ++i)
-            most = std::max(most, p.v[i].norm() / length_of_error(p.radius[i], mean_distance(system)));
-        });
-    step = elementary::cbrt(given.real("accuracy")) / fastest;
-  }
-  if (!std::isfinite(step)) step = plan.end_time ? kStepAtRest * *plan.end_time : 1;
-  if (const auto* const longest = given.find<double>("longest_step"); longest && *longest > 0)
-    step = std::min(step, *longest);
-  given.set("step", step);
-}
-template void choose_step(const System<2>&, const IntegratorInfo&, const Plan&, Parameters&, double);
-template void choose_step(const System<3>&, const IntegratorInfo&, const Plan&, Parameters&, double);
-
-void set_steps(Plan& plan, const Parameters& parameters) {
-  const auto take = [&](const char* name, double& value) {
-    if (const auto* const given = parameters.find<double>(name)) value = *given;
-  };
-  take("step", plan.step);
-  take("longest_step", plan.longest_step);
-  take("accuracy", plan.accuracy);
-  take("shortest_step", plan.shortest_step);
-}
-
 std::array<double, 2> ramp_times(const Plan& plan, std::int64_t start_step, double start_time) {
   refuse_endless(plan, nullptr, true);
   double end = plan.end_time.value_or(std::numeric_limits<double>::infinity());
@@ -213,7 +170,11 @@ typename Simulation<D>::Prepared Simulation<D>::prepare(const System<D>& system,
   if (info.hard_cores) check_spheres(system);
   if (plan.step != 0 && given.has("step"))
     throw Error(Failure::deck, "the step is given twice; give it with the plan or with the integrator, not with both");
-  if (plan.step != 0) given.set("step", plan.step);
+  for (const auto& [name, value] : {std::pair{"step", plan.step},
+                                    {"longest_step", plan.longest_step},
+                                    {"accuracy", plan.accuracy},
+                                    {"shortest_step", plan.shortest_step}})
+    if (value != 0 && !given.has(name)) given.set(name, value);
   choose_step(system, info, plan, given);
   given = completed(info.name, info.parameters, std::move(given));
   set_steps(plan, given);
@@ -266,7 +227,9 @@ void Simulation<D>::begin(const Hooks& hooks) {
     if (!hooks.branch) make_monitor();
     first_of_integrator_ = system_->fields.of_run().size();
     integrator_->start(*system_, s.counters);
-    if (info_.adapts) clock_.expect(info_.most_contacts, contacts, clock_.adapts() ? first_step() : kNever);
+    if (info_.adapts)
+      clock_.expect(info_.most_contacts, contacts,
+                    clock_.adapts() ? first_step(*system_, plan_) : std::numeric_limits<double>::infinity());
   }
   if (again || hooks.restore) {
     decomposition.to_blocks();
@@ -408,10 +371,8 @@ bool Simulation<D>::fly(Slab& slab, SlabReport<D>& report, SlabWatch& watch) {
       return false;
     } catch (const Error& e) {
       if (e.failure() != Failure::numerical) throw;
-      std::string what = no_room_text(
-          2 * std::max(slab.length, clock_.adapts()
-                                        ? 0
-                                        : plan_.step));  // squeezed spheres collide ever faster before there is no room
+      // Squeezed spheres collide ever faster before there is no room.
+      std::string what = no_room_text(2 * std::max(slab.length, clock_.adapts() ? 0 : plan_.step));
       for (const WallOptions<D>& each : system_->box.options)  // a shaken wall is farthest out a quarter and three
                                                                // quarters of a period after its phase is zero
         for (const double turns : {0.25, 0.75})
@@ -432,55 +393,6 @@ void Simulation<D>::act_of_bath(const Slab& slab, double complete, SlabReport<D>
   if (bath.kicks() && info_.stepping) kick_all(*system_, slab.start, slab.length, report.counters);
 }
 
-/// The first step if the method chooses its steps: at most Plan::step, and so short that no particle moves farther than
-/// its diameter times the cube root of the accuracy, by its velocity or by forces. An acceleration a that changes to
-/// its own size over a diameter d changes at the rate j = a v/d, and a h² = 2 d ε^(1/3) and v h = d ε^(1/3) make the
-/// local error j h³/12 = d ε^(2/3)/6. That is too long, but for the smooth parts of most forces by less than the factor
-/// of ten that a few repetitions of the step find, or a few doublings make good.
-template <int D>
-double Simulation<D>::first_step() {
-  const System<D>& system = *system_;
-  const auto& p = system.particles;
-  std::vector<Vec<D>> force(p.size());
-  Counters uncounted;
-  evaluate_forces<D>(system, p.x, force, uncounted);
-  const double distance = mean_distance(system);
-  double speed = 0, strength = 0;  // of the fastest and of the most accelerated particle, in diameters
-  for (Id i = 0; i < p.size(); ++i) {
-    if (p.fixed(i) || !p.owns(i)) continue;
-    const double length = length_of_error(p.radius[i], distance);
-    speed = std::max(speed, p.v[i].norm() / length);
-    strength = std::max(strength, force[i].norm() / (p.mass[i] * length));
-  }
-  std::array<double, 2> most{speed, strength};
-  system.decomposition.ranks().largest(most);
-  const double part = elementary::cbrt(plan_.accuracy);
-  double length = std::min({plan_.step, part / most[0], std::sqrt(2 * part / most[1]), longest_step()});
-  return std::max(length, plan_.shortest_step);
-}
-
-/// The longest step that the plan, the walls, the bath and the fastest particle allow. A bath that acts at the ends of
-/// steps moves the kinetic energy by at most a tenth of its distance from the mean at once. A particle flies no farther
-/// than a quarter of the longest edge, as in the slab core, since positions would lose digits, and than a quarter of
-/// the range of each force with a cutoff, so that two particles that come near feel it in at least one step before they
-/// would have passed each other. If nothing moves, steps do not grow.
-template <int D>
-double Simulation<D>::longest_step() const {
-  constexpr double kOfRelaxation = 0.1, kOfLength = 0.25;
-  double shortest = system_->box.edges.maxCoeff();
-  for (const auto& term : system_->interactions)
-    if (const double range = term->bonds() ? 0 : term->reach(system_->particles.x); range > 0)
-      shortest = std::min(shortest, range);
-  double squared = 0;
-  for (const Vec<D>& v : system_->particles.v) squared = std::max(squared, v.squaredNorm());
-  const double fastest = std::sqrt(system_->decomposition.largest(squared));
-  const Bath& bath = system_->box.bath;
-  double longest = fastest > 0 ? kOfLength * shortest / fastest : plan_.step;
-  longest = std::min({longest, system_->box.longest_step(), plan_.longest_step > 0 ? plan_.longest_step : kNever});
-  if (bath.type != Bath::Type::none && bath.rate > 0) longest = std::min(longest, kOfRelaxation / bath.rate);
-  return longest;
-}
-
 /// Counts the slab of a method that adapts, and sets the length of the next one.
 template <int D>
 void Simulation<D>::adapt(const Slab& slab, const SlabReport<D>& report, std::uint64_t contacts, double complete) {
@@ -494,7 +406,8 @@ void Simulation<D>::adapt(const Slab& slab, const SlabReport<D>& report, std::ui
     s.shortest_step = s.shortest_step > 0 ? std::min(s.shortest_step, complete) : complete;
     s.longest_step = std::max(s.longest_step, complete);
   }
-  clock_.adapt(slab, report.error, contacts, clock_.adapts() ? longest_step() : kNever);
+  clock_.adapt(slab, report.error, contacts,
+               clock_.adapts() ? longest_step(*system_, plan_) : std::numeric_limits<double>::infinity());
 }
 
 /// Sets the times of a ramp of the bath's temperature, unless they are given or an earlier plan has set them.

@@ -52,15 +52,6 @@ struct Plan {
   }
 };
 
-/// Completes the parameters of a method that chooses its steps, or epochs, if no step is given: the first step, or
-/// `step`, which was the first one when the run began. Collective.
-template <int D>
-void choose_step(const System<D>& system, const IntegratorInfo& info, const Plan& plan, Parameters& given,
-                 double step = 0);
-
-/// Takes the steps of a plan from the parameters of its method.
-void set_steps(Plan& plan, const Parameters& parameters);
-
 /// Why a run, or a ramp of its bath, would never end. `what` is empty if it ends.
 struct EndlessRun {
   enum class Cause { run, collisions, bath } cause = Cause::run;
@@ -91,7 +82,7 @@ struct Readings {
   std::uint64_t collisions = 0;       ///< pair collisions so far
   double kinetic = 0, potential = 0;  ///< [energy]; K with that of spins, V with its long-range corrections
   double shadow = std::numeric_limits<double>::quiet_NaN();  ///< S_h [energy]; NaN if the method has none
-  std::array<double, D> momentum{};                          // no Vec, whose alignment would leave gaps
+  std::array<double, D> momentum{};  ///< an array, because a Vec is aligned and would leave gaps in the struct
   double temperature = 0;  ///< Σ m v²/(D N) of the N particles that are not fixed, in units of energy (k_B = 1); total
                            ///< momentum is not subtracted
   double dissipated = 0, work = 0, heat = 0;  ///< sums of ContactTally so far [energy]
@@ -151,7 +142,7 @@ class Observer {
 struct Statistics {
   std::int64_t steps = 0;
   double step_length = 0;  ///< of the last step [time]
-  /// Of the steps of this run, without the last one if the end made it shorter; 0: there was none [time].
+  /// The extremes of the steps of this run, without the last one if the end made it shorter; 0: there was none [time].
   double shortest_step = 0, longest_step = 0;
   double end_time = 0;       ///< simulated time reached
   double fraction_done = 0;  ///< part of the plan that is done, 0…1
@@ -299,8 +290,6 @@ class Simulation {
   void begin(const Hooks& hooks);
   bool fly(Slab& slab, SlabReport<D>& report, SlabWatch& watch);
   void act_of_bath(const Slab& slab, double complete, SlabReport<D>& report);
-  double first_step();
-  double longest_step() const;
   void adapt(const Slab& slab, const SlabReport<D>& report, std::uint64_t contacts, double complete);
   void set_ramp();
   void lengthen_slabs(double length);

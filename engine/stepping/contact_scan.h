@@ -137,8 +137,8 @@ class ContactScan {
 
  private:
   bool open(const Touch<D>& touch) const { return touch.gap > tolerance(rest_.distance(touch.key)); }
-  /// The largest gap at which a contact is looked at.
-  double reach(const EventKey<D>& key, const Vec<D>& normal) const {
+  /// The largest gap with which a contact is put into touching_.
+  double noticed_gap(const EventKey<D>& key, const Vec<D>& normal) const {
     return std::max(tolerance(rest_.distance(key)), rest_.widest_gap(key, normal));
   }
   void note_open();

@@ -6,13 +6,28 @@
 // rate j, the position at the end is wrong by ∫∫ j (t − h/2) dt dt = j h³/12. The mean accelerations a and a⁻ of this
 // step and the one before belong to the middles of the steps, so j = 2 |a − a⁻|/(h + h⁻).
 
-#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 
-#include "engine/forces/forces.h"
-#include "engine/stepping/slab_watch.h"
+#include "engine/ranks/system.h"
 
 namespace carom {
+
+/// The largest local error of any particle, relative to its diameter; of a point: to the mean distance of the
+/// particles.
+struct LocalError {
+  double rate = 0;  ///< the error of a step of length h is rate · h³ [1/time³]
+  Id id = 0;        ///< the particle
+  double of(double length) const { return rate * length * length * length; }
+};
+
+/// Thrown on all ranks together: the slab is repeated with this length, because it is not accurate enough, has too many
+/// contacts, or its equations cannot be solved.
+struct StepTooLong {
+  double length = 0;
+  std::optional<Id> id{};  ///< the particle with the largest error, if the step is not accurate enough
+};
 
 /// The length to which the error of a particle is relative: its diameter or, of a point, the mean distance.
 inline double length_of_error(double radius, double mean_distance) { return radius > 0 ? 2 * radius : mean_distance; }

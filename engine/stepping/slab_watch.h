@@ -9,32 +9,15 @@
 
 #include <cstring>
 #include <functional>
-#include <optional>
 #include <utility>
 #include <vector>
 
 #include "engine/base/fields.h"
-#include "engine/base/vec.h"
 
 namespace carom {
 
-/// Thrown on all ranks together: the slab is abandoned.
+/// Thrown on all ranks together: the slab is abandoned. StepTooLong (local_error.h) repeats it.
 struct SlabLeft {};
-
-/// The largest local error of any particle (local_error.h), relative to its diameter; of a point: to the mean distance
-/// of the particles.
-struct LocalError {
-  double rate = 0;  ///< the error of a step of length h is rate · h³ [1/time³]
-  Id id = 0;        ///< the particle
-  double of(double length) const { return rate * length * length * length; }
-};
-
-/// Thrown on all ranks together: the slab is not accurate enough, or has too many contacts, and is repeated with this
-/// length.
-struct StepTooLong {
-  double length = 0;
-  std::optional<Id> id{};  ///< the particle with the largest error, if this is the reason
-};
 
 class SlabWatch {
  public:

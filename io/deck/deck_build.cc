@@ -6,6 +6,7 @@
 #include "engine/laws/contact_options.h"
 #include "engine/laws/wall_options.h"
 #include "engine/ranks/id_blocks.h"
+#include "engine/run/step_choice.h"
 #include "engine/setup/epoch.h"
 #include "engine/setup/placement.h"
 #include "io/deck/deck_source.h"

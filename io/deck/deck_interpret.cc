@@ -6,6 +6,7 @@
 #include "engine/laws/bath_options.h"
 #include "engine/laws/contact_options.h"
 #include "engine/laws/wall_options.h"
+#include "engine/run/step_choice.h"
 #include "io/deck/deck_source.h"
 #include "io/deck/options.h"
 

@@ -173,7 +173,7 @@ std::optional<std::string> accuracy_warning(const Statistics& s, const Integrato
   return fmt::format(
       "warning: the steps are long: about time {:g}, one of them left the position of particle {} wrong by {:.2g} of "
       "its "
-      "diameter, which the exact energy does not show; use a smaller integrator.step, or leave it out",
+      "diameter, which the exact energy does not show; use a smaller integrator.step or accuracy, or leave both out",
       s.local_error_time, s.local_error_id, s.local_error);
 }
 

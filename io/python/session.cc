@@ -12,6 +12,7 @@
 #include "engine/laws/wall_options.h"
 #include "engine/run/measurement.h"
 #include "engine/run/state.h"
+#include "engine/run/step_choice.h"
 #include "engine/setup/epoch.h"
 #include "io/files/log_report.h"
 

@@ -67,7 +67,10 @@ end_time = 2.1
 def test_a_pile_does_not_overlap(tmp_path, ranks, step):
     """Earlier versions let these spheres sink into each other by 1e-6 of their contact distance."""
     deck, sets = write_deck(tmp_path, PILE), [f"integrator.step={step}"]
-    mpirun(ranks, command(deck, tmp_path / "out", sets)) if ranks > 1 else run(deck, tmp_path / "out", sets)
+    if ranks > 1:
+        mpirun(ranks, command(deck, tmp_path / "out", sets))
+    else:
+        run(deck, tmp_path / "out", sets)
     end = summary(tmp_path / "out")
     assert end["max_overlap"] <= 1e-11 and end["warnings"] == []
     assert end["energy"]["dissipated"] > 0.1

@@ -9,6 +9,7 @@
 #include "engine/forces/pair_filter.h"
 #include "engine/laws/contact_options.h"
 #include "engine/ranks/id_blocks.h"
+#include "engine/run/step_choice.h"
 #include "engine/setup/placement.h"
 
 namespace carom::test {
