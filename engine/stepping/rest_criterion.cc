@@ -63,9 +63,8 @@ double RestCriterion<D>::opening_by_forces(const EventKey<D>& key, const Vec<D>&
 template <int D>
 double RestCriterion<D>::pressing(const EventKey<D>& key, const Vec<D>& normal, double force) const {
   const bool pair = key.kind == EventKind::pair;
-  const double inverse_mass = 1 / particles_.mass[key.lo] + (pair ? 1 / particles_.mass[key.hi] : 0.0);
   const double opening = opening_by_forces(key, normal);
-  double closing = std::max(force * inverse_mass, -opening);
+  double closing = std::max(force * inverse_mass(key), -opening);
   if (!fallen_back_.empty())
     for (const auto& [partners, acceleration] : fallen_back_)
       if (partners == without_time(key)) closing = std::max(closing, acceleration);
@@ -117,10 +116,7 @@ template <int D>
 double RestCriterion<D>::slowest_impact(const EventKey<D>& key, const Vec<D>& normal, double closing) const {
   const ContactLaw& law = law_of(key);
   // Kicks sustain a bounce with the approach speed n kick/(1 + e) that takes n steps, as long as n ≤ 2e n/(1 + e) + 1.
-  const double kick = kick_ * std::max(0.0, closing),
-               inverse_mass =
-                   1 / particles_.mass[key.lo] + (key.kind == EventKind::pair ? 1 / particles_.mass[key.hi] : 0.0);
-  const double e = law.restitution_at({kick, inverse_mass}, 0, 0);
+  const double kick = kick_ * std::max(0.0, closing), e = law.restitution_at({kick, inverse_mass(key)}, 0, 0);
   return rest_speed(key, normal) + kick * std::min(1 / (1 - e), 1.0 * kMostBounces);
 }
 

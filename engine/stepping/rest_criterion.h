@@ -120,6 +120,9 @@ class RestCriterion {
   double opening_by_forces(const EventKey<D>& key, const Vec<D>& normal) const;
   double slowest_impact(const EventKey<D>& key, const Vec<D>& normal, double closing) const;
   double slowest_bounce(const EventKey<D>& key, const Vec<D>& normal, double closing) const;
+  double inverse_mass(const EventKey<D>& key) const {
+    return 1 / particles_.mass[key.lo] + (key.kind == EventKind::pair ? 1 / particles_.mass[key.hi] : 0.0);
+  }
   double acceleration(Id i) const { return a_ && i < a_->size() ? (*a_)[i].norm() : 0; }
   double speed_of_rest(double closing, double sigma) const {
     return std::min(std::sqrt(2 * closing * kRestingGap * sigma), 0.5 * closing * length_ / kMostBounces);
