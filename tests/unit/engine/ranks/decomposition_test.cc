@@ -558,7 +558,9 @@ TEST(Decomposition, PilesDoNotOverlap) {
     };
     const Statistics alone = run(nullptr);
     EXPECT_LT(alone.counters.max_overlap, 1e-11);
-    if (find_integrator(c.method).exact) EXPECT_LT(alone.max_energy_error, 1e-12 * alone.energy_reference);
+    if (find_integrator(c.method).exact) {
+      EXPECT_LT(alone.max_energy_error, 1e-12 * alone.energy_reference);
+    }
     test::ThreadRanks(2).run([&](Communicator& exchange) { test::expect_same(alone, run(&exchange)); });
   }
 }
