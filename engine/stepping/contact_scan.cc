@@ -45,6 +45,7 @@ void ContactScan<D>::begin_step(Counters& counters, std::vector<Contact<D>>* con
   events_ = already;
   events_at_last_cut_ = std::numeric_limits<std::uint64_t>::max();
   rest_.begin_step(a, length);
+  solver_.reset();
 }
 
 /// Finds all contacts at x, in the order of their keys, and gaps so small that contacts may be held there.
@@ -105,8 +106,6 @@ void ContactScan<D>::note_open() {
     if (!open(touch)) touched[touch.key.lo] = touched[touch.pair() ? touch.key.hi : touch.key.lo] = 1;
   for (Touch<D>& touch : touching_) {
     if (!open(touch)) continue;
-    touch.may_be_held =
-        rest_.kicks() || touch.force > 0 || touch.gap <= rest_.holding_gap(touch.key, touch.normal, touch.force);
     touch.may_hit = touched[touch.key.lo] || (touch.pair() && touched[touch.key.hi]);
   }
 }
@@ -119,8 +118,7 @@ void ContactScan<D>::sort_out(Positions<D> v, bool all_stop) {
   for (const Touch<D>& touch : touching_) {
     const double speed = normal_speed(touch, v), resting = resting_speed(touch, v);
     const bool fast = speed < -rest_.stopping_speed(touch.key, touch.normal, touch.force, resting);
-    // A fast contact must be allowed an impulse; a slow one that opens must be allowed to be held.
-    if (!(fast ? touch.may_hit : speed < 0 || touch.may_be_held)) continue;
+    if (fast && !touch.may_hit) continue;
     if (fast && !(all_stop && rest_.dissipates(touch.key)))
       approaching_.push_back(touch);
     else if (speed <= rest_.holding_speed(touch.key, touch.normal, touch.force, resting))
@@ -273,7 +271,8 @@ double ContactScan<D>::normal_slack(const RestingContact<D>& contact, Positions<
 template <int D>
 bool ContactScan<D>::press_apart(Vectors<D> w, double force) {
   for (auto& contact : resting_) contact.lambda = contact.force / (force * contact.normal.norm());
-  const bool found = solve_reactions<D>(resting_, particles_.mass, w);
+  if (!solver_ || !solver_->is_for(resting_)) solver_ = std::make_unique<ReactionSolver<D>>(resting_, particles_.mass);
+  const bool found = solver_->solve(resting_, w);
   for (auto& contact : resting_) contact.force = contact.lambda * force * contact.normal.norm();
   return found;
 }
@@ -394,6 +393,7 @@ double ContactScan<D>::count_dissipated(Positions<D> before, Positions<D> after)
 
 template <int D>
 void ContactScan<D>::remember(double length) {
+  rest_.forget_falls();
   if (resting_.empty() && reactions_.empty()) return;
   for (const auto& contact : resting_)
     if (contact.key.kind == EventKind::wall)

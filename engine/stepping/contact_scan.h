@@ -24,10 +24,9 @@ template <int D>
 struct Touch {
   EventKey<D> key;  ///< key.time counts from now for a future contact
   Vec<D> normal;  ///< pair: x_lo − x_hi, acting on lo, and its negative on hi; wall: unit vector inwards, acting on lo
-  double speed = 0;         ///< velocity of a wall along its normal
-  double force = 0;         ///< the reaction of a present contact in the last piece [force]
-  double gap = 0;           ///< of a present contact [length]
-  bool may_be_held = true;  ///< an open contact: whether the gap is so small that a slow contact is held
+  double speed = 0;     ///< velocity of a wall along its normal
+  double force = 0;     ///< the reaction of a present contact in the last piece [force]
+  double gap = 0;       ///< of a present contact [length]
   bool may_hit = true;  ///< an open contact: whether it gets an impulse at once, because a partner has a contact now
   bool pair() const { return key.kind == EventKind::pair; }
 };
@@ -134,6 +133,7 @@ class ContactScan {
   double stopping_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo, const Vec<D>& v_hi) const;
 
   RestCriterion<D>& rest() { return rest_; }
+  const RestCriterion<D>& rest() const { return rest_; }
 
  private:
   bool open(const Touch<D>& touch) const { return touch.gap > tolerance(rest_.distance(touch.key)); }
@@ -187,6 +187,7 @@ class ContactScan {
   RestCriterion<D> rest_;
   std::vector<Touch<D>> touching_, approaching_;
   std::vector<RestingContact<D>> resting_;
+  std::unique_ptr<ReactionSolver<D>> solver_;  // of this step, for the reactions over a piece
 };
 
 }  // namespace carom

@@ -79,9 +79,7 @@ double RestCriterion<D>::rest_speed(const EventKey<D>& key, const Vec<D>& normal
   const ContactLaw& law = law_of(key);
   const double slowest = law.slowest(box_.contacts.thermal_speed);
   if (law.rest_speed >= 0) return slowest;
-  const double strongest =
-      key.kind == EventKind::pair ? std::max(acceleration(key.lo), acceleration(key.hi)) : acceleration(key.lo);
-  const double falling = strongest - std::max(0.0, opening_by_forces(key, normal));
+  const double falling = strongest(key) - std::max(0.0, opening_by_forces(key, normal));
   return std::max(slowest, std::sqrt(2 * std::max(0.0, falling) * kRestHeight * distance(key)));
 }
 
@@ -127,19 +125,12 @@ double RestCriterion<D>::slowest_bounce(const EventKey<D>& key, const Vec<D>& no
   return std::min(slowest_impact(key, normal, closing), 0.5 * closing * length_);
 }
 
-template <int D>
-double RestCriterion<D>::holding_gap(const EventKey<D>& key, const Vec<D>& normal, double force) const {
-  if (!dissipates(key)) return 0;
-  const double closing = pressing(key, normal, force), slowest = slowest_bounce(key, normal, closing);
-  return closing > 0 ? slowest * slowest / (2 * kMostBounces * closing) : 0;
-}
-
 /// Kicks would close a gap that is smaller than what a bounce within a step opens with more energy than the fall gives,
 /// and that energy would keep a pile moving. So with kicks the gap is h²/8 times the accelerations of the two spheres.
 template <int D>
 double RestCriterion<D>::widest_gap(const EventKey<D>& key, const Vec<D>& normal) const {
   if (!dissipates(key)) return 0;
-  if (!kicks()) return rest_speed(key, normal) * length_ / kMostBounces;
+  if (!kicks()) return gap_of(rest_speed(key, normal), strongest(key));
   const double both = acceleration(key.lo) + (key.kind == EventKind::pair ? acceleration(key.hi) : 0.0);
   return 0.125 * length_ * length_ * both;
 }
@@ -158,7 +149,7 @@ double RestCriterion<D>::widest_gap() const {
     fastest = std::max(fastest, law.slowest(box_.contacts.thermal_speed));
     if (law.rest_speed < 0) fastest = std::max(fastest, std::sqrt(2 * strongest * kRestHeight * 2 * widest));
   }
-  return fastest * length_ / kMostBounces;
+  return gap_of(fastest, 0);
 }
 
 template <int D>

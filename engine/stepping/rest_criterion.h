@@ -9,8 +9,7 @@
 //                       or a partner touches another sphere
 //   touching  held      −stopping_speed() ≤ u < 0: a reaction stops the approach    ½ m u² dissipated; without a
 //                                                                                   law returned (edda, cdda)
-//   touching  held      0 ≤ u ≤ holding_speed(), if the gap is at most              none
-//                       holding_gap(), or if the contact was held before
+//   touching  held      0 ≤ u ≤ holding_speed()                                     none
 //   touching  free      u > holding_speed()                                         none
 //   held      held      the reaction that keeps it from approaching is positive     its work: of a wall, or folded
 //   held      free      that reaction is zero                                       none
@@ -65,6 +64,8 @@ class RestCriterion {
   void begin_step(const std::vector<Vec<D>>* a, double length);
   /// Call this when the reactions have changed.
   void note_reactions();
+  /// Call this when a piece is accepted: the next one finds out again which contacts fall back.
+  void forget_falls() { fallen_back_.clear(); }
   /// For methods that kick: within this time the kick that presses partners together counts as slow [time].
   void stop_within(double time) { kick_ = time; }
   bool kicks() const { return kick_ > 0; }
@@ -98,10 +99,9 @@ class RestCriterion {
   /// It is held if it opens more slowly than this: the resting speed or, if it dissipates, one at which it closes again
   /// within the step so slowly that it stops.
   double holding_speed(const EventKey<D>& key, const Vec<D>& normal, double force, double resting) const;
-  /// If it dissipates it is held where it is if the gap is as small as this: a bounce at an eighth of the speed at
-  /// which approaches end opens it as far. 0 if nothing presses it.
-  double holding_gap(const EventKey<D>& key, const Vec<D>& normal, double force) const;
-  /// The largest gap of this contact from which a slow approach stops; 0 unless it dissipates.
+  /// The largest gap of this contact from which a slow approach stops, and with which it is held; 0 unless it
+  /// dissipates. It is a quarter of the height from which a fall gives the rest speed, and no more than a sphere
+  /// crosses at that speed in the step; see rest_criterion.cc for methods that kick.
   double widest_gap(const EventKey<D>& key, const Vec<D>& normal) const;
   /// No widest_gap() is larger than this.
   double widest_gap() const;
@@ -111,7 +111,7 @@ class RestCriterion {
   double rest_speed(const EventKey<D>& key, const Vec<D>& normal) const;
 
   /// Whether a contact that opens at this speed, and closes again with this acceleration, rests; it does until the end
-  /// of the step. False if this is known already.
+  /// of the piece. False if this is known already.
   bool falls_back(const EventKey<D>& key, const Vec<D>& normal, double closing, double speed);
 
  private:
@@ -124,6 +124,13 @@ class RestCriterion {
     return 1 / particles_.mass[key.lo] + (key.kind == EventKind::pair ? 1 / particles_.mass[key.hi] : 0.0);
   }
   double acceleration(Id i) const { return a_ && i < a_->size() ? (*a_)[i].norm() : 0; }
+  double strongest(const EventKey<D>& key) const {
+    return key.kind == EventKind::pair ? std::max(acceleration(key.lo), acceleration(key.hi)) : acceleration(key.lo);
+  }
+  double gap_of(double speed, double strongest) const {
+    constexpr double kOfHeight = 0.25;
+    return std::min(speed * length_, strongest > 0 ? kOfHeight * speed * speed / (2 * strongest) : kNever);
+  }
   double speed_of_rest(double closing, double sigma) const {
     return std::min(std::sqrt(2 * closing * kRestingGap * sigma), 0.5 * closing * length_ / kMostBounces);
   }

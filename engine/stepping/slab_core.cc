@@ -227,7 +227,10 @@ FlightEnd<D> SlabCore<D>::serve() {
     const bool held = !held_.empty() && (held_[key.lo] != 0 || (pair && held_[key.hi] != 0));
     // A straight flight presses no spheres together: elastic contacts that do not approach need no impulse.
     if (held || ((!a_.empty() || !box_.contacts.elastic()) && comes_to_rest(key))) {
-      if (falls_back(key)) return {.complete = false, .key = key};
+      if (falls_back(key)) {  // and with it others, so that the piece need not be tried again for each of them
+        for (const Planned& other : queue_) falls_back(other.key);
+        return {.complete = false, .key = key};
+      }
       return {.complete = false, .time = box_.contacts.elastic() ? key.time : end_before(key), .key = key};
     }
     const std::uint32_t most = std::max(version(key.lo), pair ? version(key.hi) : 0);
@@ -352,14 +355,20 @@ bool SlabCore<D>::comes_to_rest(const EventKey<D>& key) const {
   return meeting.speed >= -scan_->stopping_speed(key, meeting.normal, meeting.v_lo, meeting.v_hi);
 }
 
-/// The time at which the gap is a quarter of the tolerance; that of the contact if this was before the start.
+/// The time at which the gap is a quarter of the tolerance; that of the contact if this was before the start. If the
+/// approach is slow and the method does not kick: the time at which the gap is half of the one from which the approach
+/// stops, so that the end need not be found to rounding.
 template <int D>
 double SlabCore<D>::end_before(const EventKey<D>& key) const {
   const Meeting meeting(*this, key);
-  const double early = 0.25 * scan_->tolerance(meeting.sigma);
-  const double end = meeting.speed < 0 ? key.time + early / meeting.speed : key.time;
+  if (!(meeting.speed < 0)) return key.time;
   const double both_fly_from = std::max(start(key.lo), key.kind == EventKind::pair ? start(key.hi) : 0.0);
-  return end > both_fly_from ? end : key.time;
+  const double closed = 0.25 * scan_->tolerance(meeting.sigma);
+  const bool slow = !scan_->rest().kicks() && comes_to_rest(key);
+  const double wide = slow ? 0.5 * scan_->rest().widest_gap(key, meeting.normal) : 0;
+  for (const double early : {std::max(closed, wide), closed})
+    if (const double end = key.time + early / meeting.speed; end > both_fly_from) return end;
+  return key.time;
 }
 
 /// Whether a contact is so close to the end of the slab, or so slow, that without it the spheres would never overlap by
@@ -383,9 +392,9 @@ bool SlabCore<D>::at_the_end(const EventKey<D>& key) const {
   return (wall.one_way ? wall.clearance(x, meeting.sigma, length_) : wall.gap(x, meeting.sigma, length_)) >= -most;
 }
 
-/// Whether the spheres touch at the start and come together again before the contact has opened by what a contact at
-/// rest may: then it rests, which the accelerations before this flight did not show. True once for each contact in a
-/// step.
+/// Whether the spheres touch at the start, or are as near as a slow approach may stop, and come together again so
+/// slowly that the contact rests, which the accelerations before this flight did not show. True once for each contact
+/// in a piece.
 template <int D>
 bool SlabCore<D>::falls_back(const EventKey<D>& key) {
   const bool pair = key.kind == EventKind::pair;
@@ -395,7 +404,9 @@ bool SlabCore<D>::falls_back(const EventKey<D>& key) {
   const Meeting meeting(*this, key), before(*this, at_start);
   const double gap =
       pair ? before.normal.norm() - before.sigma : box_.wall(key.hi).gap(particles_.x[key.lo], before.sigma);
-  if (!(gap <= scan_->tolerance(before.sigma)) || !(before.speed > 0)) return false;
+  const bool open = gap > scan_->tolerance(before.sigma);
+  if (!open && !(before.speed > 0)) return false;
+  if (open && gap > scan_->rest().widest_gap(key, before.normal)) return false;
   return scan_->rest().falls_back(key, before.normal, (before.speed - meeting.speed) / key.time, before.speed);
 }
 

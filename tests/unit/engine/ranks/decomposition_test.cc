@@ -544,15 +544,15 @@ TEST(Decomposition, PilesDoNotOverlap) {
   struct Case {
     Scene<2> scene;
     std::string method;
-    double step;
+    double step, end_time = 13;
   };
-  for (const Case& c : {Case{meeting, "cva", 0.005}, Case{column, "edda", 0.018}, Case{column, "edda", 0.02},
+  for (const Case& c : {Case{meeting, "cva", 0.005, 2.1}, Case{column, "edda", 0.018}, Case{column, "edda", 0.02},
                         Case{layers, "edda", 0.02}, Case{layers, "cdda", 0.02}, Case{layers, "psa", 0.02}}) {
     SCOPED_TRACE(c.method + " " + std::to_string(c.step));
     const auto run = [&](Communicator* ranks) {
       auto system = c.scene();
       if (ranks) system->decomposition.join(*ranks);
-      const auto simulation = test::make_run<2>(std::move(system), c.method, {.step = c.step, .end_time = 13});
+      const auto simulation = test::make_run<2>(std::move(system), c.method, {.step = c.step, .end_time = c.end_time});
       simulation->run();
       return simulation->statistics();
     };

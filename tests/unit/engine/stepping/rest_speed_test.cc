@@ -80,8 +80,13 @@ TEST(RestSpeed, OfAPowerLawStopsWhatTheLawWouldReturn) {
 
 TEST(RestSpeed, BoundsTheGapsFromWhichApproachesStop) {
   Two falls(kLaw, {{0, -1}, {0, -2}});
-  EXPECT_DOUBLE_EQ(falls.criterion->widest_gap(kPair, falls.normal(kPair)),
-                   falls.rest_speed(kPair) * 0.1 / kMostBounces);
+  // A quarter of the height from which a fall at 2 gives the rest speed, or the way at that speed in the step.
+  const double speed = falls.rest_speed(kPair);
+  EXPECT_DOUBLE_EQ(falls.criterion->widest_gap(kPair, falls.normal(kPair)), 0.25 * speed * speed / (2 * 2));
+  falls.criterion->begin_step(&falls.a, 1e-4);
+  EXPECT_DOUBLE_EQ(falls.criterion->widest_gap(kPair, falls.normal(kPair)), speed * 1e-4);
+  EXPECT_GE(falls.criterion->widest_gap(), falls.criterion->widest_gap(kPair, falls.normal(kPair)));
+  falls.criterion->begin_step(&falls.a, 0.1);
   EXPECT_GE(falls.criterion->widest_gap(), falls.criterion->widest_gap(kPair, falls.normal(kPair)));
   falls.criterion->stop_within(0.1);  // with kicks: h²/8 of the accelerations of the partners
   EXPECT_DOUBLE_EQ(falls.criterion->widest_gap(kPair, falls.normal(kPair)), 0.125 * 0.01 * 3);
@@ -158,14 +163,18 @@ TEST(HoldingSpeed, IsThatOfABounceWithinTheStep) {
 TEST(RestSpeed, FallingBackPressesAContactOnce) {
   Two falls({{"restitution", 0.5}, {"rest_speed", 0.05}}, {{0, 0}, {0, 0}});
   const Vec<2> n = falls.normal(kPair);
-  EXPECT_EQ(falls.criterion->holding_gap(kPair, n, 0), 0);  // nothing presses
+  const auto holding = [&] { return falls.criterion->holding_speed(kPair, n, 0, 0); };
+  EXPECT_EQ(holding(), 0);  // nothing presses
   EXPECT_FALSE(falls.criterion->falls_back(kPair, n, 0, 0.01));
   EXPECT_FALSE(falls.criterion->falls_back(kPair, n, 2, 0.06));
   EXPECT_TRUE(falls.criterion->falls_back(kPair, n, 2, 0.04));
   EXPECT_FALSE(falls.criterion->falls_back(kPair, n, 2, 0.04));
-  EXPECT_DOUBLE_EQ(falls.criterion->holding_gap(kPair, n, 0), 0.05 * 0.05 / (2 * kMostBounces * 2));
+  EXPECT_DOUBLE_EQ(holding(), 0.05);
+  falls.criterion->forget_falls();
+  EXPECT_EQ(holding(), 0);
+  EXPECT_TRUE(falls.criterion->falls_back(kPair, n, 2, 0.04));
   falls.criterion->begin_step(&falls.a, 0.1);
-  EXPECT_EQ(falls.criterion->holding_gap(kPair, n, 0), 0);
+  EXPECT_EQ(holding(), 0);
 }
 
 }  // namespace
