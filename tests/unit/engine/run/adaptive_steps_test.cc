@@ -156,6 +156,22 @@ TEST(StepsOfTheirOwn, BeginWithoutAMotion) {
   EXPECT_LE(run->statistics().local_error, 8e-4);
 }
 
+/// A disc bounces off a wall and then, in the same step of cdda, meets the force of one that comes behind it.
+TEST(StepsOfTheirOwn, AreRepeatedFromTheStateAtTheirStart) {
+  const auto fly = [](const test::Given& given) {
+    auto system =
+        test::make_system<2>(Vec<2>{100, 20}, Boundary::wall, {{20.7, 10}, {26, 10}}, {{-1, 0}, {-1, 0}}, {0.5, 0.5});
+    test::add_interaction(*system, "yukawa", {{"amplitude", 5.0}, {"kappa", 1.0}, {"cutoff", 4.0}});
+    auto run = test::make_run<2>(std::move(system), "cdda", {.end_time = 28}, given);
+    run->run();
+    return run;
+  };
+  const auto run = fly({{"accuracy", 1e-4}}), fine = fly({{"step", 1e-3}});
+  EXPECT_GT(run->statistics().counters.steps_rejected, 0u);
+  EXPECT_GT(run->statistics().counters.sphere_wall, 1u);
+  for (const Id i : {0, 1}) EXPECT_LT((run->system().particles.x[i] - fine->system().particles.x[i]).norm(), 0.02) << i;
+}
+
 /// A fluid of hard discs, in steps of several mean free times.
 TEST(FixedSteps, AreDividedIfSpheresCollideOftenInThem) {
   const auto fly = [](double step) {
@@ -176,6 +192,21 @@ TEST(FixedSteps, AreDividedIfSpheresCollideOftenInThem) {
   const double wanted = std::max(0.5, 32.0 / static_cast<double>(run->system().size()));
   EXPECT_GT(static_cast<double>(s.counters.pieces), 0.7 * contacts / wanted);
   EXPECT_LT(static_cast<double>(s.counters.pieces), 4 * contacts / wanted);
+}
+
+/// A lattice of discs that fly side by side, without a collision, until the first ones hit a wall.
+TEST(FixedSteps, AreRepeatedIfFarMoreSpheresCollideThanBefore) {
+  std::vector<Vec<2>> x;
+  for (int i = 0; i < 14; ++i)
+    for (int k = 0; k < 14; ++k) x.push_back({20 + 1.01 * i, 3 + 1.01 * k});
+  const std::size_t n = x.size();
+  auto system = test::make_system<2>(Vec<2>{60, 20}, Boundary::wall, std::move(x), std::vector<Vec<2>>(n, {-5, 0}),
+                                     std::vector<double>(n, 0.5));
+  auto run = test::make_run<2>(std::move(system), "edda", {.step = 0.05, .end_time = 4.5});
+  run->run();
+  const Statistics& s = run->statistics();
+  EXPECT_GT(s.counters.sphere_sphere, 1000u);
+  EXPECT_GT(s.counters.slabs_halved, 0u);
 }
 
 }  // namespace

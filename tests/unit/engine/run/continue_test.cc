@@ -229,6 +229,13 @@ TEST(Continue, MethodsThatCutTheStepOfAll) {
                                                                                 {"cdda", {{"order", std::int64_t{4}}}}})
     compare<2>(springs(method, given), {{0, 0}, {2, 3}}, {1, 9});
 }
+/// Steps that the method chooses, and a long one that is divided: how far the clock has come is part of the state.
+TEST(Continue, StepsThatMethodsChoose) {
+  for (const char* method : {"edda", "cdda"}) compare<2>(springs(method, {{"accuracy", 1e-3}}), {{2, 3}}, {9});
+  Scene<2> divided = springs("edda");
+  divided.plan = plan_of(1, 3);
+  compare<2>(divided, {{0, 0}, {2, 3}}, {5});
+}
 /// `slab_collisions`: far fewer than in an epoch, of which there are about 500 in 2.2 time units.
 Scene<3> fluid(std::optional<std::uint64_t> slab_collisions = {}) {
   return {[] { return test::hard_spheres<3>(6, 0.35); },

@@ -157,6 +157,13 @@ TEST(RunClock, AStepThatWasTooLongIsRepeatedWithALengthOfItsOwn) {
   EXPECT_THROW(run.clock.shorten(run.clock.next_slab(run.s), {.length = 0.02, .id = 3}), Error);
 }
 
+TEST(RunClock, AStepHasAtMostSixtyFourParts) {
+  Stroll run({.step = 1, .steps = 30}, 10, 1e6);
+  const Slab slab = run.clock.next_slab(run.s);
+  EXPECT_EQ(slab.length, 1.0 / 64);
+  EXPECT_EQ(slab.most_contacts, std::numeric_limits<double>::infinity());
+}
+
 TEST(RunClock, FixedStepsAreDividedByTheNumberOfContacts) {
   Stroll run({.step = 1, .steps = 30}, 10, 20);  // of each of ten particles, as long as 2/20 units of time
   EXPECT_EQ(run.step(0, 1), 0.5);                // 200 are expected in a unit of time, 100 wanted
