@@ -90,6 +90,10 @@ Parameter boundary_key() {
 
 Parameter type_key(const std::string& meaning) { return {"type", text, "", "-", meaning}; }
 
+constexpr const char* kAdapts =
+    "leave it out: this method has fixed steps, because its energy error would grow; take edda or cdda, whose energy is "
+    "exact at any step";
+
 std::vector<TableSchema> make_schema() {
   return {
       {"",
@@ -191,7 +195,9 @@ std::vector<TableSchema> make_schema() {
        variants_of(integrators()),
        {{"acdda", "write \"edda\", which keeps the energy as exactly"},
         {"acva", "write \"edda\", which keeps the energy exactly, or \"cva\""},
-        {"adaptive", "leave it out, or take a shorter 'step'"}}},
+        {"adaptive", "leave it out, or take a shorter 'step'"},
+        {"accuracy", kAdapts},
+        {"shortest_step", kAdapts}}},
       {"run",
        false,
        true,

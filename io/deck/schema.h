@@ -29,7 +29,8 @@ struct TableSchema {
   std::string meaning;
   std::vector<Parameter> keys;
   std::vector<Variant> variants{};                   ///< non-empty: `type` chooses one of them
-  std::vector<std::array<std::string, 2>> former{};  ///< removed types and keys, and what to write instead
+  std::vector<std::array<std::string, 2>> former{};  ///< types and keys that were removed or belong to
+                                                     ///< other variants, and what to write instead
 
   const Variant* variant(std::string_view type) const;
   /// "[name]" or "[[name]]"; "the deck" for the keys at the top.
