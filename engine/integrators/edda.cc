@@ -160,14 +160,13 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         }
         found_.touching = found_.touching || until_contact < kNever;
         until_contact = kNever;
-        cut_ = {};
         looked = false;
         continue;
       }
       system.decomposition.need_all();
       if (!end_.complete && !end_.too_strong) {
         scan.count_event(end_.key);
-        until_contact = end_.time > 0 ? cut_at(piece) : kNever;
+        until_contact = end_.time > 0 ? end_.time : kNever;
         found_.touching = found_.touching || until_contact == kNever;
         looked = looked && until_contact < kNever;
         continue;
@@ -196,17 +195,6 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
                                             ", are not finite or far too stiff for step = " + short_text(slab.length) +
                                             "; use a smaller integrator.step");
     }
-  }
-
-  /// The length of the piece that ends at the contact of end_, which the last attempt, of this length, has met. The
-  /// accelerations depend on the length of the piece, and so does the time of the contact: after two attempts the
-  /// secant through them gives the length at which both agree.
-  double cut_at(double length) {
-    const Cut before = std::exchange(cut_, {without_time(end_.key), length, end_.time});
-    const double slope = (cut_.time - before.time) / (length - before.length);
-    if (!(before.key == cut_.key) || !(std::abs(slope) < 0.9)) return end_.time;
-    const double both = (end_.time - slope * length) / (1 - slope);
-    return both > 0 && both < length ? both : end_.time;
   }
 
   /// Estimates the local error of a piece that has been solved. Throws StepTooLong.
@@ -475,10 +463,6 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   Found found_, kept_;                // kept_: at the end of the last step
   int sweeps_ = 0;                    // of the last piece
   FlightEnd<D> end_;                  // of the last flight
-  struct Cut {
-    EventKey<D> key{};
-    double length = 0, time = 0;
-  } cut_;  // the last attempt at a piece, and the contact that it met
   std::int64_t step_ = -1;
   std::vector<Vec<D>> move_;  // change of a_ in the last sweep
   Counters* counters_ = nullptr;

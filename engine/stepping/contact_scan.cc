@@ -45,7 +45,6 @@ void ContactScan<D>::begin_step(Counters& counters, std::vector<Contact<D>>* con
   events_ = already;
   events_at_last_cut_ = std::numeric_limits<std::uint64_t>::max();
   rest_.begin_step(a, length);
-  solver_.reset();
 }
 
 /// Finds all contacts at x, in the order of their keys, and gaps so small that contacts may be held there.
@@ -271,8 +270,7 @@ double ContactScan<D>::normal_slack(const RestingContact<D>& contact, Positions<
 template <int D>
 bool ContactScan<D>::press_apart(Vectors<D> w, double force) {
   for (auto& contact : resting_) contact.lambda = contact.force / (force * contact.normal.norm());
-  if (!solver_ || !solver_->is_for(resting_)) solver_ = std::make_unique<ReactionSolver<D>>(resting_, particles_.mass);
-  const bool found = solver_->solve(resting_, w);
+  const bool found = solve_reactions<D>(resting_, particles_.mass, w);
   for (auto& contact : resting_) contact.force = contact.lambda * force * contact.normal.norm();
   return found;
 }
@@ -393,7 +391,6 @@ double ContactScan<D>::count_dissipated(Positions<D> before, Positions<D> after)
 
 template <int D>
 void ContactScan<D>::remember(double length) {
-  rest_.forget_falls();
   if (resting_.empty() && reactions_.empty()) return;
   for (const auto& contact : resting_)
     if (contact.key.kind == EventKind::wall)

@@ -187,7 +187,6 @@ class ContactScan {
   RestCriterion<D> rest_;
   std::vector<Touch<D>> touching_, approaching_;
   std::vector<RestingContact<D>> resting_;
-  std::unique_ptr<ReactionSolver<D>> solver_;  // of this step, for the reactions over a piece
 };
 
 }  // namespace carom

@@ -64,8 +64,6 @@ class RestCriterion {
   void begin_step(const std::vector<Vec<D>>* a, double length);
   /// Call this when the reactions have changed.
   void note_reactions();
-  /// Call this when a piece is accepted: the next one finds out again which contacts fall back.
-  void forget_falls() { fallen_back_.clear(); }
   /// For methods that kick: within this time the kick that presses partners together counts as slow [time].
   void stop_within(double time) { kick_ = time; }
   bool kicks() const { return kick_ > 0; }
@@ -111,7 +109,7 @@ class RestCriterion {
   double rest_speed(const EventKey<D>& key, const Vec<D>& normal) const;
 
   /// Whether a contact that opens at this speed, and closes again with this acceleration, rests; it does until the end
-  /// of the piece. False if this is known already.
+  /// of the step. False if this is known already.
   bool falls_back(const EventKey<D>& key, const Vec<D>& normal, double closing, double speed);
 
  private:

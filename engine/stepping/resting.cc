@@ -10,7 +10,6 @@
 #include "engine/base/particles.h"
 
 namespace carom {
-
 namespace {
 
 // The proximal terms, added to a diagonal of ones. The first term makes all pivots similar, so that few exchanges find
@@ -23,9 +22,6 @@ constexpr int kBeforeLowering = 4;  // repetitions with a raised proximal term, 
 // ones this may be less than the rounding of the factors; then a solution is accepted that would also be kept.
 constexpr int kStrictRepetitions = 8;
 constexpr int kExchanges = 50;
-// Normals that turn by an angle of 0.01 between two solutions leave 0.01 of the error in each correction with the old
-// factors; where these do not lead to rounding, the matrix is factored again.
-constexpr int kCorrections = 8;
 constexpr int kFruitlessExchanges = 5;  // of all wrong contacts, before only one is exchanged at a time
 // Coming near through the interior: the most rounds; the share of the way to the boundary that a step goes; a proximal
 // term of 10⁴ roundings, since the matrix may be singular; the distances, relative to the largest gap, at which it is
@@ -36,15 +32,12 @@ constexpr double kFewRoundings = 8 * std::numeric_limits<double>::epsilon();  //
 constexpr double kMostStretched = 0.1;  // of the kinetic energy: the turn of a sliding pair takes less
 constexpr int kWall = -1;               // in place of a second body
 
-}  // namespace
-
 /// The contacts of a system, with the spheres that they act on.
 template <int D>
 class Problem {
  public:
-  /// `tied`: contacts may neither close nor open.
-  Problem(std::span<const RestingContact<D>> contacts, const std::vector<double>& mass, bool tied = false)
-      : tied_(tied) {
+  Problem(std::span<RestingContact<D>> contacts, const std::vector<double>& mass, std::span<Vec<D>> w, bool tied)
+      : contacts_(contacts), w_(w), tied_(tied) {
     std::vector<int> place(mass.size(), kWall);  // by particle: its place in bodies_
     for (const auto& contact : contacts) {
       place[contact.key.lo] = 0;
@@ -55,19 +48,19 @@ class Problem {
       place[id] = static_cast<int>(bodies_.size());
       bodies_.push_back({id, 1 / mass[id], moving_mass(mass[id])});
     }
-    for (const auto& contact : contacts)
-      arms_.push_back({place[contact.key.lo], pair(contact) ? place[contact.key.hi] : kWall});
+    for (const auto& contact : contacts) {
+      Arm arm{place[contact.key.lo], pair(contact) ? place[contact.key.hi] : kWall};
+      const double inverse_mass = bodies_[arm.lo].inverse_mass + (arm.hi == kWall ? 0.0 : bodies_[arm.hi].inverse_mass);
+      arm.scale = std::sqrt(contact.normal.squaredNorm() * inverse_mass);
+      arms_.push_back(arm);
+    }
   }
 
-  /// Solves each cluster that is not solved yet, and adds the effect of the reactions to w. The contacts are the ones
-  /// that the problem was made for; their normals and bounds may have changed.
-  bool solve(std::span<RestingContact<D>> contacts, std::span<Vec<D>> w, double* lost) {
-    contacts_ = contacts;
-    w_ = w;
+  /// Solves each cluster that is not solved yet, and adds the effect of the reactions to w.
+  bool solve(double* lost) {
     bool solved = true;
     if (std::vector<int> all = everything(); !settled(all, true)) {
-      for (Cluster& cluster : clusters())
-        solved &= settled(cluster.contacts, true) || correct(cluster) || solve(cluster);
+      for (const auto& cluster : clusters()) solved &= settled(cluster, true) || solve(cluster);
       push(all);
     }
     for (const Body& body : bodies_) {
@@ -81,17 +74,14 @@ class Problem {
   /// Solves for velocities and conserves their kinetic energy: the motion of a cluster is rescaled relative to its
   /// centre of mass, and along the axes of walls that it touches relative to the walls. Returns the energy that is
   /// still missing.
-  double solve_and_stretch(std::span<RestingContact<D>> contacts, std::span<Vec<D>> w) {
-    contacts_ = contacts;
-    w_ = w;
+  double solve_and_stretch() {
     if (settled(everything(), true)) {
       for (const Body& body : bodies_) w_[body.id] += body.shift;
       return 0;
     }
     double lacks = 0;
-    for (Cluster& each : clusters()) {
-      const std::vector<int>& cluster = each.contacts;
-      if (!settled(cluster, true)) solve(each);
+    for (const auto& cluster : clusters()) {
+      if (!settled(cluster, true)) solve(cluster);
       push(cluster);
       std::vector<int> bodies;
       Vec<D> free = Vec<D>::Ones(), momentum = Vec<D>::Zero();  // free: 0 along axes of walls that the cluster touches
@@ -150,16 +140,6 @@ class Problem {
     int lo, hi;        // indices into bodies_; hi: kWall at a wall
     double scale = 1;  // square root of the diagonal of N M⁻¹ Nᵀ, which the problem is scaled with
   };
-  /// The contacts that shared spheres connect, ascending, and their matrix.
-  struct Cluster {
-    std::vector<int> contacts;
-    std::vector<char> active{};         // by contact: whether it is taken to be under pressure
-    Eigen::SparseMatrix<double> all{};  // the lower half of the matrix
-    std::vector<char> factored{};       // the contacts that the solver holds the factors for,
-    Eigen::VectorXd added{};            // and what was added to their diagonal
-    std::unique_ptr<Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>> solver{};
-    int size() const { return static_cast<int>(contacts.size()); }
-  };
 
   std::vector<int> everything() const {
     std::vector<int> all(size());
@@ -169,11 +149,12 @@ class Problem {
   static bool pair(const RestingContact<D>& contact) { return contact.key.kind == EventKind::pair; }
   int size() const { return static_cast<int>(contacts_.size()); }
 
-  std::vector<Cluster>& clusters() {
-    if (!clusters_.empty()) return clusters_;
+  /// The contacts of each cluster that shared spheres connect, ascending.
+  std::vector<std::vector<int>> clusters() {
     for (int k = 0; k < size(); ++k)
       for (const int body : {arms_[k].lo, arms_[k].hi})
         if (body != kWall && bodies_[body].mass > 0) bodies_[body].contacts.push_back(k);
+    std::vector<std::vector<int>> found;
     std::vector<char> seen(size(), 0);
     for (int first = 0; first < size(); ++first) {
       if (seen[first]) continue;
@@ -186,9 +167,9 @@ class Problem {
             if (!std::exchange(seen[k], 1)) cluster.push_back(k);
         }
       std::ranges::sort(cluster);
-      clusters_.push_back({std::move(cluster)});
+      found.push_back(std::move(cluster));
     }
-    return clusters_;
+    return found;
   }
 
   /// Computes the shifts that the reactions of a cluster cause.
@@ -234,77 +215,45 @@ class Problem {
 
   /// Tries the last reactions. Where they are of no use, it comes near the solution through the interior, which tells
   /// which contacts are under pressure.
-  bool solve(Cluster& cluster) {
-    const int m = cluster.size();
+  bool solve(const std::vector<int>& cluster) {
+    const int m = static_cast<int>(cluster.size());
     std::vector<double> start(m);
-    for (int k = 0; k < m; ++k) start[k] = contacts_[cluster.contacts[k]].lambda;
+    for (int k = 0; k < m; ++k) start[k] = contacts_[cluster[k]].lambda;
     arrange(cluster);
     if (solve(cluster, start, kLastProximal, false)) return true;
     const Eigen::VectorXd gap = gaps(cluster);
     Eigen::VectorXd reaction = Eigen::VectorXd::Constant(m, gap.cwiseAbs().maxCoeff()), opening = reaction;
     for (const double close : kClose) {
       if (tied_) break;
-      if (!approach(cluster, gap, close, reaction, opening)) break;
-      for (int k = 0; k < m; ++k)
-        start[k] = reaction[k] > opening[k] ? reaction[k] / arms_[cluster.contacts[k]].scale : 0;
+      if (!approach(gap, close, reaction, opening)) break;
+      for (int k = 0; k < m; ++k) start[k] = reaction[k] > opening[k] ? reaction[k] / arms_[cluster[k]].scale : 0;
       if (solve(cluster, start, kLastProximal, close == kClose[1])) return true;
     }
     return solve(cluster, std::vector<double>(m, 0.0), kFirstProximal, true);
   }
 
   /// How fast the contacts open without reactions, which are set to zero.
-  Eigen::VectorXd gaps(const Cluster& cluster) {
-    Eigen::VectorXd gap(cluster.size());
-    for (const int k : cluster.contacts) contacts_[k].lambda = 0;
-    push(cluster.contacts);
-    for (int k = 0; k < cluster.size(); ++k) gap[k] = scaled_excess(cluster, k);
+  Eigen::VectorXd gaps(const std::vector<int>& cluster) {
+    Eigen::VectorXd gap(static_cast<Eigen::Index>(cluster.size()));
+    for (const int k : cluster) contacts_[k].lambda = 0;
+    push(cluster);
+    for (Eigen::Index k = 0; k < gap.size(); ++k) gap[k] = excess(cluster[k]) / arms_[cluster[k]].scale;
     return gap;
-  }
-  double scaled_excess(const Cluster& cluster, int k) const {
-    return excess(cluster.contacts[k]) / arms_[cluster.contacts[k]].scale;
-  }
-
-  /// Corrects the last reactions with the factors of the last solution, which are nearly right as long as the normals
-  /// have hardly turned. Returns false, with the reactions unchanged, if this does not solve the problem.
-  bool correct(Cluster& cluster) {
-    if (cluster.factored.empty()) return false;
-    const int m = cluster.size();
-    std::vector<double> start(m);
-    for (int k = 0; k < m; ++k) {
-      double& lambda = contacts_[cluster.contacts[k]].lambda;
-      start[k] = lambda;
-      if (!cluster.factored[k]) lambda = 0;
-    }
-    Eigen::VectorXd right(m);
-    bool solved = false;
-    push(cluster.contacts);
-    for (int round = 0; round < kCorrections; ++round) {
-      for (int k = 0; k < m; ++k) right[k] = cluster.factored[k] ? -scaled_excess(cluster, k) : 0;
-      const Eigen::VectorXd more = cluster.solver->solve(right);
-      for (int k = 0; k < m; ++k)
-        if (cluster.factored[k]) {
-          double& lambda = contacts_[cluster.contacts[k]].lambda;
-          lambda = std::max(0.0, lambda + more[k] / arms_[cluster.contacts[k]].scale);
-        }
-      if (std::exchange(solved, settled(cluster.contacts)) && solved) return true;
-    }
-    for (int k = 0; k < m; ++k) contacts_[cluster.contacts[k]].lambda = start[k];
-    return false;
   }
 
   /// Starts from these reactions. If all are zero, it starts from the contacts that approach, and with the first
   /// proximal term from all contacts. Where pivoting makes no progress, the proximal term is raised; if the start is of
   /// no use at all, only where it `insists`.
-  bool solve(Cluster& cluster, const std::vector<double>& start, double proximal, bool insists) {
-    const int m = cluster.size();
+  bool solve(const std::vector<int>& cluster, const std::vector<double>& start, double proximal, bool insists) {
+    const int m = static_cast<int>(cluster.size());
     const bool known = std::ranges::any_of(start, [](double lambda) { return lambda > 0; });
     const bool all = tied_ || proximal == kFirstProximal;
     Eigen::VectorXd reaction(m), before(m);
     const Eigen::VectorXd gap = gaps(cluster);
-    cluster.active.assign(m, 0);
+    active_.assign(m, 0);
     for (int k = 0; k < m; ++k) {
-      reaction[k] = start[k] * arms_[cluster.contacts[k]].scale;
-      cluster.active[k] = all || (known ? start[k] > 0 : gap[k] < 0 || contacts_[cluster.contacts[k]].force > 0);
+      reaction[k] = start[k] * arms_[cluster[k]].scale;
+      active_[k] = all || (known ? start[k] > 0 : gap[k] < 0);
     }
     bool solved = false;
     double lowest = kLastProximal;
@@ -312,19 +261,19 @@ class Problem {
     for (int repetition = 0; repetition < kRepetitions; ++repetition) {
       before = reaction;
       proximal_ = proximal;
-      const std::vector<char> active = cluster.active;
+      const std::vector<char> active = active_;
       if (!pivot(cluster, gap, before, reaction, proximal == kFirstProximal)) {
         if ((repetition == 0 && !insists) || proximal == kFirstProximal) return false;
         reaction = before;
-        cluster.active = active;
+        active_ = active;
         proximal = lowest = std::min(proximal / kProximalRatio, kFirstProximal);
         raised = repetition;
         continue;
       }
-      set_reactions(cluster, reaction);
+      for (int k = 0; k < m; ++k) contacts_[cluster[k]].lambda = reaction[k] / arms_[cluster[k]].scale;
       // One more repetition: beside the large terms of a light sphere the error of a heavy one is invisible.
-      if (std::exchange(solved, settled(cluster.contacts)) && solved) return true;
-      if (repetition >= kStrictRepetitions && settled(cluster.contacts, true)) return true;
+      if (std::exchange(solved, settled(cluster)) && solved) return true;
+      if (repetition >= kStrictRepetitions && settled(cluster, true)) return true;
       if (repetition - raised == kBeforeLowering) {
         lowest = std::max(kProximalRatio * lowest, kLastProximal);
         raised = repetition;
@@ -334,35 +283,29 @@ class Problem {
     return false;
   }
 
-  void set_reactions(const Cluster& cluster, const Eigen::VectorXd& reaction) {
-    for (int k = 0; k < cluster.size(); ++k)
-      contacts_[cluster.contacts[k]].lambda = reaction[k] / arms_[cluster.contacts[k]].scale;
-  }
-
   /// Block principal pivoting: makes (A + δ) λ + gap − δ λ_before zero where λ > 0, and non-negative elsewhere. Gives
   /// up without progress unless `patient`.
-  bool pivot(Cluster& cluster, const Eigen::VectorXd& gap, const Eigen::VectorXd& before, Eigen::VectorXd& reaction,
-             bool patient) {
-    const int m = cluster.size();
+  bool pivot(const std::vector<int>& cluster, const Eigen::VectorXd& gap, const Eigen::VectorXd& before,
+             Eigen::VectorXd& reaction, bool patient) {
+    const int m = static_cast<int>(cluster.size());
     // Exchanging all wrong contacts takes few rounds but may cycle. Where it makes no progress, only the last wrong
     // contact is exchanged, which terminates (Murty, Linear Algebra Appl. 7 (1974) 65).
     int fewest = m + 1, exchanges_left = kFruitlessExchanges;
     Eigen::VectorXd right(m);
     std::vector<int> wrong;
     for (int round = 0; round < kExchanges + 4 * m; ++round) {
-      if (!factor(cluster, cluster.active, Eigen::VectorXd::Constant(m, proximal_))) return false;
-      for (int k = 0; k < m; ++k) right[k] = cluster.active[k] ? proximal_ * before[k] - gap[k] : 0;
-      reaction = cluster.solver->solve(right);
+      if (!factor(active_, Eigen::VectorXd::Constant(m, proximal_))) return false;
+      for (int k = 0; k < m; ++k) right[k] = active_[k] ? proximal_ * before[k] - gap[k] : 0;
+      reaction = solver_.solve(right);
       if (!reaction.allFinite()) return false;
       if (tied_) return true;
-      set_reactions(cluster, reaction);
-      push(cluster.contacts);
+      for (int k = 0; k < m; ++k) contacts_[cluster[k]].lambda = reaction[k] / arms_[cluster[k]].scale;
+      push(cluster);
       wrong.clear();
       for (int k = 0; k < m; ++k) {
-        const int contact = cluster.contacts[k];
-        const double allowed = tolerance(contact) / arms_[contact].scale;
-        const bool flips =
-            cluster.active[k] ? reaction[k] < -allowed : scaled_excess(cluster, k) - proximal_ * before[k] < -allowed;
+        const double allowed = tolerance(cluster[k]) / arms_[cluster[k]].scale;
+        const bool flips = active_[k] ? reaction[k] < -allowed
+                                      : excess(cluster[k]) / arms_[cluster[k]].scale - proximal_ * before[k] < -allowed;
         if (flips) wrong.push_back(k);
       }
       if (wrong.empty()) {
@@ -377,24 +320,19 @@ class Problem {
         if (!patient) return false;
         wrong.erase(wrong.begin(), wrong.end() - 1);
       }
-      for (const int k : wrong) cluster.active[k] ^= 1;
+      for (const int k : wrong) active_[k] ^= 1;
     }
     return false;
   }
 
   /// Computes the scaled matrix of a cluster, and the order in which its contacts are eliminated, whichever are active.
-  void arrange(Cluster& cluster) {
-    const int m = cluster.size();
+  void arrange(const std::vector<int>& cluster) {
+    const int m = static_cast<int>(cluster.size());
     std::vector<int> place(size(), kWall);
-    for (int k = 0; k < m; ++k) {
-      place[cluster.contacts[k]] = k;
-      Arm& arm = arms_[cluster.contacts[k]];
-      const double inverse_mass = bodies_[arm.lo].inverse_mass + (arm.hi == kWall ? 0.0 : bodies_[arm.hi].inverse_mass);
-      arm.scale = std::sqrt(contacts_[cluster.contacts[k]].normal.squaredNorm() * inverse_mass);
-    }
+    for (int k = 0; k < m; ++k) place[cluster[k]] = k;
     std::vector<Eigen::Triplet<double>> entries;
     for (int row = 0; row < m; ++row) {
-      const int k = cluster.contacts[row];
+      const int k = cluster[row];
       for (const int b : {arms_[k].lo, arms_[k].hi}) {
         if (b == kWall) continue;
         for (const int l : bodies_[b].contacts) {
@@ -405,21 +343,19 @@ class Problem {
         }
       }
     }
-    cluster.all.resize(m, m);
-    cluster.all.setFromTriplets(entries.begin(), entries.end());
-    cluster.factored.clear();
-    if (cluster.solver) return;
-    cluster.solver = std::make_unique<Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>>();
-    cluster.solver->analyzePattern(cluster.all);
+    all_.resize(m, m);
+    all_.setFromTriplets(entries.begin(), entries.end());
+    solver_.analyzePattern(all_);
+    factored_.clear();
   }
 
   /// Factors the matrix of the active contacts with these terms added to its diagonal. The other contacts have rows and
   /// columns of the identity.
-  bool factor(Cluster& cluster, const std::vector<char>& active, const Eigen::VectorXd& added) {
-    if (active == cluster.factored && added == cluster.added) return true;
-    cluster.factored = active;
-    cluster.added = added;
-    Eigen::SparseMatrix<double> matrix = cluster.all;
+  bool factor(const std::vector<char>& active, const Eigen::VectorXd& added) {
+    if (active == factored_ && added == added_) return true;
+    factored_ = active;
+    added_ = added;
+    Eigen::SparseMatrix<double> matrix = all_;
     for (Eigen::Index column = 0; column < matrix.outerSize(); ++column)
       for (Eigen::SparseMatrix<double>::InnerIterator at(matrix, column); at; ++at) {
         const bool diagonal = at.row() == column;
@@ -428,30 +364,29 @@ class Problem {
         else if (diagonal)
           at.valueRef() += added[column];
       }
-    cluster.solver->factorize(matrix);
-    return cluster.solver->info() == Eigen::Success;
+    solver_.factorize(matrix);
+    return solver_.info() == Eigen::Success;
   }
 
   /// Comes near the solution through positive reactions and openings, by the predictor and corrector of Mehrotra (SIAM
   /// J. Optim. 2 (1992) 575; Nocedal, Wright, Numerical Optimization, ch. 16.6): in about 20 rounds, however large the
   /// cluster is. Ends where reactions times openings are on average below the square of `close` times the largest gap.
   /// Returns false if no reactions seem to hold the contacts, as where walls squeeze a sphere.
-  bool approach(Cluster& cluster, const Eigen::VectorXd& gap, double close, Eigen::VectorXd& reaction,
-                Eigen::VectorXd& opening) {
+  bool approach(const Eigen::VectorXd& gap, double close, Eigen::VectorXd& reaction, Eigen::VectorXd& opening) {
     const auto count = static_cast<double>(gap.size());
     const double wanted = close * gap.cwiseAbs().maxCoeff();
     const std::vector<char> every(gap.size(), 1);
     bool possible = false;
     for (int round = 0; round < kRounds; ++round) {
-      const Eigen::VectorXd off = opening - cluster.all.template selfadjointView<Eigen::Lower>() * reaction - gap;
+      const Eigen::VectorXd off = opening - all_.template selfadjointView<Eigen::Lower>() * reaction - gap;
       const double mean = reaction.dot(opening) / count;
       possible = off.cwiseAbs().maxCoeff() <= wanted;
       if (possible && mean <= wanted * wanted) break;
       const Eigen::VectorXd ratio = opening.cwiseQuotient(reaction);
-      if (!factor(cluster, every, (ratio.array() + kInteriorProximal).matrix())) break;
+      if (!factor(every, (ratio.array() + kInteriorProximal).matrix())) break;
       Eigen::VectorXd step, opens, target = Eigen::VectorXd::Zero(gap.size());
       const auto longest = [&] {  // the share of the step that keeps all reactions and openings positive
-        step = cluster.solver->solve(off - opening + target);
+        step = solver_.solve(off - opening + target);
         opens = target - opening - ratio.cwiseProduct(step);
         double share = 1;
         for (Eigen::Index k = 0; k < gap.size(); ++k) {
@@ -476,41 +411,27 @@ class Problem {
   bool tied_;
   std::vector<Body> bodies_;
   std::vector<Arm> arms_;
-  std::vector<Cluster> clusters_;
+  std::vector<char> active_;         // by contact of the cluster that is being solved
+  std::vector<char> factored_;       // the contacts that solver_ holds the factors for,
+  Eigen::VectorXd added_;            // and what was added to their diagonal
+  Eigen::SparseMatrix<double> all_;  // the lower half of the matrix of the cluster
   double proximal_ = 0;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver_;
 };
 
-template <int D>
-ReactionSolver<D>::ReactionSolver(std::span<const RestingContact<D>> contacts, const std::vector<double>& mass) {
-  for (const auto& contact : contacts) keys_.push_back(contact.key);
-  problem_ = std::make_unique<Problem<D>>(contacts, mass);
-}
-template <int D>
-ReactionSolver<D>::~ReactionSolver() = default;
-
-template <int D>
-bool ReactionSolver<D>::is_for(std::span<const RestingContact<D>> contacts) const {
-  return std::ranges::equal(contacts, keys_, {}, &RestingContact<D>::key);
-}
-
-template <int D>
-bool ReactionSolver<D>::solve(std::span<RestingContact<D>> contacts, std::span<Vec<D>> w, double* lost) {
-  return problem_->solve(contacts, w, lost);
-}
+}  // namespace
 
 template <int D>
 bool solve_reactions(std::span<RestingContact<D>> contacts, const std::vector<double>& mass, std::span<Vec<D>> w,
                      double* lost) {
-  return contacts.empty() || Problem<D>(contacts, mass).solve(contacts, w, lost);
+  return contacts.empty() || Problem<D>(contacts, mass, w, false).solve(lost);
 }
 
 template <int D>
 double keep_tangential(std::span<RestingContact<D>> contacts, const std::vector<double>& mass, std::span<Vec<D>> v) {
-  return contacts.empty() ? 0 : Problem<D>(contacts, mass, true).solve_and_stretch(contacts, v);
+  return contacts.empty() ? 0 : Problem<D>(contacts, mass, v, true).solve_and_stretch();
 }
 
-template class ReactionSolver<2>;
-template class ReactionSolver<3>;
 template bool solve_reactions<2>(std::span<RestingContact<2>>, const std::vector<double>&, std::span<Vec<2>>, double*);
 template bool solve_reactions<3>(std::span<RestingContact<3>>, const std::vector<double>&, std::span<Vec<3>>, double*);
 template double keep_tangential<2>(std::span<RestingContact<2>>, const std::vector<double>&, std::span<Vec<2>>);

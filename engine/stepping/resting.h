@@ -13,7 +13,6 @@
 // unique, though the motion is; there the matrix is singular. The proximal point method (Rockafellar, SIAM J. Control
 // Optim. 14 (1976) 877) adds a small diagonal to it and removes the effect on the motion by repetition.
 
-#include <memory>
 #include <span>
 #include <vector>
 
@@ -42,26 +41,6 @@ struct RestingContact {
   double slack = 0;   ///< by how much n·(w_lo − w_hi) may miss the bound before known reactions are solved again
   double lambda = 0;  ///< the reaction found
   double force = 0;   ///< the force of this reaction in the last piece with the contact held [force]
-};
-
-template <int D>
-class Problem;
-
-/// Solves the problem again and again for the same contacts, while their normals and bounds change: it keeps the
-/// factors of its matrices, so the last bits of a solution depend on the ones before.
-template <int D>
-class ReactionSolver {
- public:
-  ReactionSolver(std::span<const RestingContact<D>> contacts, const std::vector<double>& mass);
-  ~ReactionSolver();
-  /// Whether it was made for these contacts, in this order.
-  bool is_for(std::span<const RestingContact<D>> contacts) const;
-  /// See solve_reactions().
-  bool solve(std::span<RestingContact<D>> contacts, std::span<Vec<D>> w, double* lost = nullptr);
-
- private:
-  std::vector<EventKey<D>> keys_;
-  std::unique_ptr<Problem<D>> problem_;
 };
 
 /// Finds the reactions and adds their effect to w. The iteration starts from the given lambdas; if they already solve

@@ -394,7 +394,7 @@ bool SlabCore<D>::at_the_end(const EventKey<D>& key) const {
 
 /// Whether the spheres touch at the start, or are as near as a slow approach may stop, and come together again so
 /// slowly that the contact rests, which the accelerations before this flight did not show. True once for each contact
-/// in a piece.
+/// in a step.
 template <int D>
 bool SlabCore<D>::falls_back(const EventKey<D>& key) {
   const bool pair = key.kind == EventKind::pair;

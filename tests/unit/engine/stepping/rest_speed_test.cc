@@ -170,9 +170,6 @@ TEST(RestSpeed, FallingBackPressesAContactOnce) {
   EXPECT_TRUE(falls.criterion->falls_back(kPair, n, 2, 0.04));
   EXPECT_FALSE(falls.criterion->falls_back(kPair, n, 2, 0.04));
   EXPECT_DOUBLE_EQ(holding(), 0.05);
-  falls.criterion->forget_falls();
-  EXPECT_EQ(holding(), 0);
-  EXPECT_TRUE(falls.criterion->falls_back(kPair, n, 2, 0.04));
   falls.criterion->begin_step(&falls.a, 0.1);
   EXPECT_EQ(holding(), 0);
 }
