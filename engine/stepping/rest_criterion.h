@@ -19,6 +19,8 @@
 // ContactScan::sort_out() decides between the rows from `touching`, ContactScan::hold() and hold_means() between those
 // from `held`, SlabCore::serve() finds what ends a piece.
 
+#include <algorithm>
+#include <cmath>
 #include <span>
 #include <utility>
 #include <vector>
@@ -98,8 +100,9 @@ class RestCriterion {
   /// within the step so slowly that it stops.
   double holding_speed(const EventKey<D>& key, const Vec<D>& normal, double force, double resting) const;
   /// The largest gap of this contact from which a slow approach stops, and with which it is held; 0 unless it
-  /// dissipates. It is a quarter of the height from which a fall gives the rest speed, and no more than a sphere
-  /// crosses at that speed in the step; see rest_criterion.cc for methods that kick.
+  /// dissipates. It is a quarter of the height from which a fall gives the rest speed, but at least what a sphere
+  /// crosses at that speed in a 64th of the step, and at most in all of it; see rest_criterion.cc for methods that
+  /// kick.
   double widest_gap(const EventKey<D>& key, const Vec<D>& normal) const;
   /// No widest_gap() is larger than this.
   double widest_gap() const;
@@ -127,7 +130,8 @@ class RestCriterion {
   }
   double gap_of(double speed, double strongest) const {
     constexpr double kOfHeight = 0.25;
-    return std::min(speed * length_, strongest > 0 ? kOfHeight * speed * speed / (2 * strongest) : kNever);
+    const double way = speed * length_, height = strongest > 0 ? speed * speed / (2 * strongest) : kNever;
+    return std::clamp(kOfHeight * height, way / kMostBounces, way);
   }
   double speed_of_rest(double closing, double sigma) const {
     return std::min(std::sqrt(2 * closing * kRestingGap * sigma), 0.5 * closing * length_ / kMostBounces);

@@ -82,9 +82,12 @@ TEST(RestSpeed, BoundsTheGapsFromWhichApproachesStop) {
   Two falls(kLaw, {{0, -1}, {0, -2}});
   // A quarter of the height from which a fall at 2 gives the rest speed, or the way at that speed in the step.
   const double speed = falls.rest_speed(kPair);
+  falls.criterion->begin_step(&falls.a, 0.01);
   EXPECT_DOUBLE_EQ(falls.criterion->widest_gap(kPair, falls.normal(kPair)), 0.25 * speed * speed / (2 * 2));
   falls.criterion->begin_step(&falls.a, 1e-4);
   EXPECT_DOUBLE_EQ(falls.criterion->widest_gap(kPair, falls.normal(kPair)), speed * 1e-4);
+  falls.criterion->begin_step(&falls.a, 10);
+  EXPECT_DOUBLE_EQ(falls.criterion->widest_gap(kPair, falls.normal(kPair)), speed * 10 / kMostBounces);
   EXPECT_GE(falls.criterion->widest_gap(), falls.criterion->widest_gap(kPair, falls.normal(kPair)));
   falls.criterion->begin_step(&falls.a, 0.1);
   EXPECT_GE(falls.criterion->widest_gap(), falls.criterion->widest_gap(kPair, falls.normal(kPair)));
