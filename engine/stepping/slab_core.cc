@@ -231,7 +231,7 @@ FlightEnd<D> SlabCore<D>::serve() {
         for (const Planned& other : queue_) falls_back(other.key);
         return {.complete = false, .key = key};
       }
-      return {.complete = false, .time = box_.contacts.elastic() ? key.time : end_before(key), .key = key};
+      return {.complete = false, .time = box_.contacts.elastic() ? key.time : end_before(key, held), .key = key};
     }
     const std::uint32_t most = std::max(version(key.lo), pair ? version(key.hi) : 0);
     const bool too_strong = !a_.empty() && most >= kMostContactsOfParticle;
@@ -356,15 +356,15 @@ bool SlabCore<D>::comes_to_rest(const EventKey<D>& key) const {
 }
 
 /// The time at which the gap is a quarter of the tolerance; that of the contact if this was before the start. If the
-/// approach is slow and the method does not kick: the time at which the gap is half of the one from which the approach
-/// stops, so that the end need not be found to rounding.
+/// approach is slow, one of the spheres is `held`, and the method does not kick: the time at which the gap is half of
+/// the one from which the approach stops, so that the end need not be found to rounding.
 template <int D>
-double SlabCore<D>::end_before(const EventKey<D>& key) const {
+double SlabCore<D>::end_before(const EventKey<D>& key, bool held) const {
   const Meeting meeting(*this, key);
   if (!(meeting.speed < 0)) return key.time;
   const double both_fly_from = std::max(start(key.lo), key.kind == EventKind::pair ? start(key.hi) : 0.0);
   const double closed = 0.25 * scan_->tolerance(meeting.sigma);
-  const bool slow = !scan_->rest().kicks() && comes_to_rest(key);
+  const bool slow = held && !scan_->rest().kicks() && comes_to_rest(key);
   const double wide = slow ? 0.5 * scan_->rest().widest_gap(key, meeting.normal) : 0;
   for (const double early : {std::max(closed, wide), closed})
     if (const double end = key.time + early / meeting.speed; end > both_fly_from) return end;

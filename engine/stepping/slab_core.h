@@ -137,7 +137,7 @@ class SlabCore {
   bool comes_to_rest(const EventKey<D>& key) const;
   bool at_the_end(const EventKey<D>& key) const;
   bool falls_back(const EventKey<D>& key);
-  double end_before(const EventKey<D>& key) const;
+  double end_before(const EventKey<D>& key, bool held) const;
   void collide(const EventKey<D>& key);
   Flight& flight(Id i, const EventKey<D>& key);
   double path(const Vec<D>& v, const Vec<D>& a, double time) const { return time * (v.norm() + 0.5 * time * a.norm()); }
