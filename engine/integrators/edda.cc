@@ -134,17 +134,18 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     // A piece is no longer than the sweeps converge in, and ends where a contact comes to rest or a resting one is hit.
     double done = 0, until_contact = kNever;
     double& longest = found_.longest;
-    bool looked = false;  // at the contacts at the start of the piece
+    bool looked = false;  // at the contacts at the start of the piece, which need be resolved once only
     while (done < slab.length) {
-      const bool looks = found_.touching && !looked;
-      if (looks) found_.touching = system.decomposition.any(scan.find_contacts(done, p.x, p.v));
-      looked = looked || looks;
-      if (looks && found_.touching) {
-        system.decomposition.need_all();
-        owed_ += scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) {
-          return resolve_contact<D>(touch.key, touch.normal, system.box, p);
-        });
-        found_.touching = !scan.resting().empty();
+      if (found_.touching && !looked) {
+        looked = true;
+        found_.touching = system.decomposition.any(scan.find_contacts(done, p.x, p.v));
+        if (found_.touching) {
+          system.decomposition.need_all();
+          owed_ += scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) {
+            return resolve_contact<D>(touch.key, touch.normal, system.box, p);
+          });
+          found_.touching = !scan.resting().empty();
+        }
       }
       const double time_left = slab.length - done, piece = std::min({longest, until_contact, time_left});
       if (solve(system, piece, looked)) {

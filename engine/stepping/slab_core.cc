@@ -405,8 +405,7 @@ bool SlabCore<D>::falls_back(const EventKey<D>& key) {
   const double gap =
       pair ? before.normal.norm() - before.sigma : box_.wall(key.hi).gap(particles_.x[key.lo], before.sigma);
   const bool open = gap > scan_->tolerance(before.sigma);
-  if (!open && !(before.speed > 0)) return false;
-  if (open && gap > scan_->rest().widest_gap(key, before.normal)) return false;
+  if (open ? gap > scan_->rest().widest_gap(key, before.normal) : !(before.speed > 0)) return false;
   return scan_->rest().falls_back(key, before.normal, (before.speed - meeting.speed) / key.time, before.speed);
 }
 

@@ -91,9 +91,7 @@ Parameter boundary_key() {
 Parameter type_key(const std::string& meaning) { return {"type", text, "", "-", meaning}; }
 
 constexpr const char* kAdapts =
-    "leave it out: this method has fixed steps, because its energy error would grow; take edda or cdda, whose energy "
-    "is "
-    "exact at any step";
+    "leave it out: this method has fixed steps, because with others its energy error would grow; or take edda or cdda";
 
 std::vector<TableSchema> make_schema() {
   return {

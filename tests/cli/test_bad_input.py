@@ -53,7 +53,7 @@ DECK_ERRORS = {
         24, ["unknown key 'adaptive' in [integrator]", "take a shorter 'step'"]),
     "accuracy of a method with fixed steps": (
         changed('type = "cdda"', 'type = "psa"\naccuracy = 1e-6'),
-        24, ["unknown key 'accuracy' in [integrator]", "this method has fixed steps", "take edda or cdda"]),
+        24, ["unknown key 'accuracy' in [integrator]", "this method has fixed steps", "or take edda or cdda"]),
     "missing key": (changed('type = "cdda"\nstep = 0.01\n', 'type = "psa"\n'), 22, ["missing key 'step' in [integrator]", "positive number"]),
     "missing position and count": (
         changed("position = [[2.0, 5.0], [5.0, 5.0]]\nvelocity = [[1.0, 0.0], [0.0, 0.0]]\n", ""),
