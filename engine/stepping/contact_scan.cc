@@ -44,6 +44,7 @@ void ContactScan<D>::begin_step(Counters& counters, std::vector<Contact<D>>* con
   walls_at_ = std::numeric_limits<double>::quiet_NaN();  // they may move otherwise from now on
   events_ = already;
   events_at_last_cut_ = std::numeric_limits<std::uint64_t>::max();
+  solver_.forget();  // bits must not depend on where a run was interrupted
   rest_.begin_step(a, length);
 }
 
@@ -270,7 +271,7 @@ double ContactScan<D>::normal_slack(const RestingContact<D>& contact, Positions<
 template <int D>
 bool ContactScan<D>::press_apart(Vectors<D> w, double force) {
   for (auto& contact : resting_) contact.lambda = contact.force / (force * contact.normal.norm());
-  const bool found = solve_reactions<D>(resting_, particles_.mass, w);
+  const bool found = solver_.solve(resting_, particles_.mass, w);
   for (auto& contact : resting_) contact.force = contact.lambda * force * contact.normal.norm();
   return found;
 }

@@ -187,6 +187,7 @@ class ContactScan {
   RestCriterion<D> rest_;
   std::vector<Touch<D>> touching_, approaching_;
   std::vector<RestingContact<D>> resting_;
+  ReactionSolver<D> solver_;  // of press_apart()
 };
 
 }  // namespace carom

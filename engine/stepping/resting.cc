@@ -21,6 +21,9 @@ constexpr int kBeforeLowering = 4;  // repetitions with a raised proximal term, 
 // A solution is sought to the rounding of the two spheres of each contact. In a cluster with light loads beside heavy
 // ones this may be less than the rounding of the factors; then a solution is accepted that would also be kept.
 constexpr int kStrictRepetitions = 8;
+// Corrections with the factors of an earlier solution: each must leave less than this of the error.
+constexpr int kCorrections = 12;
+constexpr double kContraction = 0.2;
 constexpr int kExchanges = 50;
 constexpr int kFruitlessExchanges = 5;  // of all wrong contacts, before only one is exchanged at a time
 // Coming near through the interior: the most rounds; the share of the way to the boundary that a step goes; a proximal
@@ -32,12 +35,16 @@ constexpr double kFewRoundings = 8 * std::numeric_limits<double>::epsilon();  //
 constexpr double kMostStretched = 0.1;  // of the kinetic energy: the turn of a sliding pair takes less
 constexpr int kWall = -1;               // in place of a second body
 
+using Factors = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
+
+}  // namespace
+
 /// The contacts of a system, with the spheres that they act on.
 template <int D>
-class Problem {
+class ReactionSolver<D>::Problem {
  public:
-  Problem(std::span<RestingContact<D>> contacts, const std::vector<double>& mass, std::span<Vec<D>> w, bool tied)
-      : contacts_(contacts), w_(w), tied_(tied) {
+  /// `tied`: the contacts may neither approach nor open.
+  Problem(std::span<const RestingContact<D>> contacts, const std::vector<double>& mass, bool tied) : tied_(tied) {
     std::vector<int> place(mass.size(), kWall);  // by particle: its place in bodies_
     for (const auto& contact : contacts) {
       place[contact.key.lo] = 0;
@@ -49,18 +56,34 @@ class Problem {
       bodies_.push_back({id, 1 / mass[id], moving_mass(mass[id])});
     }
     for (const auto& contact : contacts) {
-      Arm arm{place[contact.key.lo], pair(contact) ? place[contact.key.hi] : kWall};
-      const double inverse_mass = bodies_[arm.lo].inverse_mass + (arm.hi == kWall ? 0.0 : bodies_[arm.hi].inverse_mass);
-      arm.scale = std::sqrt(contact.normal.squaredNorm() * inverse_mass);
-      arms_.push_back(arm);
+      keys_.push_back(contact.key);
+      arms_.push_back({place[contact.key.lo], pair(contact) ? place[contact.key.hi] : kWall});
+    }
+    find_clusters();
+  }
+
+  /// Whether these are the contacts that the problem was made for.
+  bool suits(std::span<const RestingContact<D>> contacts) const {
+    return std::ranges::equal(contacts, keys_, {}, &RestingContact<D>::key);
+  }
+
+  /// Starts with these normals, bounds and reactions of the contacts.
+  void begin(std::span<RestingContact<D>> contacts, std::span<Vec<D>> w) {
+    contacts_ = contacts;
+    w_ = w;
+    for (Body& body : bodies_) body.shift.setZero();
+    for (int k = 0; k < size(); ++k) {
+      const double of_hi = arms_[k].hi == kWall ? 0.0 : bodies_[arms_[k].hi].inverse_mass;
+      const double inverse_mass = bodies_[arms_[k].lo].inverse_mass + of_hi;
+      arms_[k].scale = std::sqrt(contacts[k].normal.squaredNorm() * inverse_mass);
     }
   }
 
   /// Solves each cluster that is not solved yet, and adds the effect of the reactions to w.
   bool solve(double* lost) {
     bool solved = true;
-    if (std::vector<int> all = everything(); !settled(all, true)) {
-      for (const auto& cluster : clusters()) solved &= settled(cluster, true) || solve(cluster);
+    if (const std::vector<int> all = everything(); !settled(all, true)) {
+      for (Cluster& cluster : clusters_) solved &= settled(cluster.contacts, true) || solve(cluster);
       push(all);
     }
     for (const Body& body : bodies_) {
@@ -80,8 +103,9 @@ class Problem {
       return 0;
     }
     double lacks = 0;
-    for (const auto& cluster : clusters()) {
-      if (!settled(cluster, true)) solve(cluster);
+    for (Cluster& each : clusters_) {
+      const std::vector<int>& cluster = each.contacts;
+      if (!settled(cluster, true)) solve(each);
       push(cluster);
       std::vector<int> bodies;
       Vec<D> free = Vec<D>::Ones(), momentum = Vec<D>::Zero();  // free: 0 along axes of walls that the cluster touches
@@ -140,6 +164,14 @@ class Problem {
     int lo, hi;        // indices into bodies_; hi: kWall at a wall
     double scale = 1;  // square root of the diagonal of N M⁻¹ Nᵀ, which the problem is scaled with
   };
+  /// Contacts that shared spheres connect.
+  struct Cluster {
+    std::vector<int> contacts;           // ascending
+    Eigen::SparseMatrix<double> all{};   // the lower half of its scaled matrix
+    std::vector<char> factored{};        // the contacts whose factors `factors` holds,
+    Eigen::VectorXd added{};             // and what was added to their diagonal
+    std::unique_ptr<Factors> factors{};  // null: the order of elimination is not known
+  };
 
   std::vector<int> everything() const {
     std::vector<int> all(size());
@@ -147,14 +179,12 @@ class Problem {
     return all;
   }
   static bool pair(const RestingContact<D>& contact) { return contact.key.kind == EventKind::pair; }
-  int size() const { return static_cast<int>(contacts_.size()); }
+  int size() const { return static_cast<int>(arms_.size()); }
 
-  /// The contacts of each cluster that shared spheres connect, ascending.
-  std::vector<std::vector<int>> clusters() {
+  void find_clusters() {
     for (int k = 0; k < size(); ++k)
       for (const int body : {arms_[k].lo, arms_[k].hi})
         if (body != kWall && bodies_[body].mass > 0) bodies_[body].contacts.push_back(k);
-    std::vector<std::vector<int>> found;
     std::vector<char> seen(size(), 0);
     for (int first = 0; first < size(); ++first) {
       if (seen[first]) continue;
@@ -167,9 +197,8 @@ class Problem {
             if (!std::exchange(seen[k], 1)) cluster.push_back(k);
         }
       std::ranges::sort(cluster);
-      found.push_back(std::move(cluster));
+      clusters_.push_back({std::move(cluster)});
     }
-    return found;
   }
 
   /// Computes the shifts that the reactions of a cluster cause.
@@ -215,21 +244,50 @@ class Problem {
 
   /// Tries the last reactions. Where they are of no use, it comes near the solution through the interior, which tells
   /// which contacts are under pressure.
-  bool solve(const std::vector<int>& cluster) {
+  bool solve(Cluster& which) {
+    const std::vector<int>& cluster = which.contacts;
     const int m = static_cast<int>(cluster.size());
     std::vector<double> start(m);
     for (int k = 0; k < m; ++k) start[k] = contacts_[cluster[k]].lambda;
-    arrange(cluster);
-    if (solve(cluster, start, kLastProximal, false)) return true;
+    if (correct(which, start)) return true;
+    arrange(which);
+    if (solve(which, start, kLastProximal, false)) return true;
     const Eigen::VectorXd gap = gaps(cluster);
     Eigen::VectorXd reaction = Eigen::VectorXd::Constant(m, gap.cwiseAbs().maxCoeff()), opening = reaction;
     for (const double close : kClose) {
       if (tied_) break;
-      if (!approach(gap, close, reaction, opening)) break;
+      if (!approach(which, gap, close, reaction, opening)) break;
       for (int k = 0; k < m; ++k) start[k] = reaction[k] > opening[k] ? reaction[k] / arms_[cluster[k]].scale : 0;
-      if (solve(cluster, start, kLastProximal, close == kClose[1])) return true;
+      if (solve(which, start, kLastProximal, close == kClose[1])) return true;
     }
-    return solve(cluster, std::vector<double>(m, 0.0), kFirstProximal, true);
+    return solve(which, std::vector<double>(m, 0.0), kFirstProximal, true);
+  }
+
+  /// Corrects known reactions with the factors of an earlier solution, where the same contacts were under pressure and
+  /// had nearly the same normals. Returns false if this does not lead to a solution soon.
+  bool correct(Cluster& which, std::vector<double> reaction) {
+    const std::vector<int>& cluster = which.contacts;
+    const int m = static_cast<int>(cluster.size());
+    if (which.factored.empty() || !(which.added.array() == kLastProximal).all()) return false;
+    for (int k = 0; k < m; ++k)
+      if (which.factored[k] != (reaction[k] > 0)) return false;
+    bool solved = false;
+    double last = std::numeric_limits<double>::infinity();
+    Eigen::VectorXd off(m);
+    for (int correction = 0; correction < kCorrections; ++correction) {
+      for (int k = 0; k < m; ++k) off[k] = which.factored[k] ? -excess(cluster[k]) / arms_[cluster[k]].scale : 0;
+      const double size = off.norm();
+      if (!solved && !(size <= kContraction * last)) return false;
+      last = size;
+      const Eigen::VectorXd more = which.factors->solve(off);
+      for (int k = 0; k < m; ++k) {
+        reaction[k] += more[k] / arms_[cluster[k]].scale;
+        if (!tied_ && !(reaction[k] >= 0)) return false;
+        contacts_[cluster[k]].lambda = reaction[k];
+      }
+      if (std::exchange(solved, settled(cluster)) && solved) return true;
+    }
+    return false;
   }
 
   /// How fast the contacts open without reactions, which are set to zero.
@@ -241,10 +299,11 @@ class Problem {
     return gap;
   }
 
-  /// Starts from these reactions. If all are zero, it starts from the contacts that approach, and with the first
-  /// proximal term from all contacts. Where pivoting makes no progress, the proximal term is raised; if the start is of
-  /// no use at all, only where it `insists`.
-  bool solve(const std::vector<int>& cluster, const std::vector<double>& start, double proximal, bool insists) {
+  /// Starts from these reactions. If all are zero, it starts from the contacts that approach or were under pressure in
+  /// the last piece, and with the first proximal term from all contacts. Where pivoting makes no progress, the proximal
+  /// term is raised; if the start is of no use at all, only where it `insists`.
+  bool solve(Cluster& which, const std::vector<double>& start, double proximal, bool insists) {
+    const std::vector<int>& cluster = which.contacts;
     const int m = static_cast<int>(cluster.size());
     const bool known = std::ranges::any_of(start, [](double lambda) { return lambda > 0; });
     const bool all = tied_ || proximal == kFirstProximal;
@@ -253,7 +312,7 @@ class Problem {
     active_.assign(m, 0);
     for (int k = 0; k < m; ++k) {
       reaction[k] = start[k] * arms_[cluster[k]].scale;
-      active_[k] = all || (known ? start[k] > 0 : gap[k] < 0);
+      active_[k] = all || (known ? start[k] > 0 : gap[k] < 0 || contacts_[cluster[k]].force > 0);
     }
     bool solved = false;
     double lowest = kLastProximal;
@@ -262,7 +321,7 @@ class Problem {
       before = reaction;
       proximal_ = proximal;
       const std::vector<char> active = active_;
-      if (!pivot(cluster, gap, before, reaction, proximal == kFirstProximal)) {
+      if (!pivot(which, gap, before, reaction, proximal == kFirstProximal)) {
         if ((repetition == 0 && !insists) || proximal == kFirstProximal) return false;
         reaction = before;
         active_ = active;
@@ -285,8 +344,9 @@ class Problem {
 
   /// Block principal pivoting: makes (A + δ) λ + gap − δ λ_before zero where λ > 0, and non-negative elsewhere. Gives
   /// up without progress unless `patient`.
-  bool pivot(const std::vector<int>& cluster, const Eigen::VectorXd& gap, const Eigen::VectorXd& before,
-             Eigen::VectorXd& reaction, bool patient) {
+  bool pivot(Cluster& which, const Eigen::VectorXd& gap, const Eigen::VectorXd& before, Eigen::VectorXd& reaction,
+             bool patient) {
+    const std::vector<int>& cluster = which.contacts;
     const int m = static_cast<int>(cluster.size());
     // Exchanging all wrong contacts takes few rounds but may cycle. Where it makes no progress, only the last wrong
     // contact is exchanged, which terminates (Murty, Linear Algebra Appl. 7 (1974) 65).
@@ -294,9 +354,9 @@ class Problem {
     Eigen::VectorXd right(m);
     std::vector<int> wrong;
     for (int round = 0; round < kExchanges + 4 * m; ++round) {
-      if (!factor(active_, Eigen::VectorXd::Constant(m, proximal_))) return false;
+      if (!factor(which, active_, Eigen::VectorXd::Constant(m, proximal_))) return false;
       for (int k = 0; k < m; ++k) right[k] = active_[k] ? proximal_ * before[k] - gap[k] : 0;
-      reaction = solver_.solve(right);
+      reaction = which.factors->solve(right);
       if (!reaction.allFinite()) return false;
       if (tied_) return true;
       for (int k = 0; k < m; ++k) contacts_[cluster[k]].lambda = reaction[k] / arms_[cluster[k]].scale;
@@ -326,7 +386,8 @@ class Problem {
   }
 
   /// Computes the scaled matrix of a cluster, and the order in which its contacts are eliminated, whichever are active.
-  void arrange(const std::vector<int>& cluster) {
+  void arrange(Cluster& which) {
+    const std::vector<int>& cluster = which.contacts;
     const int m = static_cast<int>(cluster.size());
     std::vector<int> place(size(), kWall);
     for (int k = 0; k < m; ++k) place[cluster[k]] = k;
@@ -343,19 +404,22 @@ class Problem {
         }
       }
     }
-    all_.resize(m, m);
-    all_.setFromTriplets(entries.begin(), entries.end());
-    solver_.analyzePattern(all_);
-    factored_.clear();
+    which.all.resize(m, m);
+    which.all.setFromTriplets(entries.begin(), entries.end());
+    if (!which.factors) {
+      which.factors = std::make_unique<Factors>();
+      which.factors->analyzePattern(which.all);
+    }
+    which.factored.clear();
   }
 
   /// Factors the matrix of the active contacts with these terms added to its diagonal. The other contacts have rows and
   /// columns of the identity.
-  bool factor(const std::vector<char>& active, const Eigen::VectorXd& added) {
-    if (active == factored_ && added == added_) return true;
-    factored_ = active;
-    added_ = added;
-    Eigen::SparseMatrix<double> matrix = all_;
+  bool factor(Cluster& which, const std::vector<char>& active, const Eigen::VectorXd& added) {
+    if (active == which.factored && added == which.added) return true;
+    which.factored = active;
+    which.added = added;
+    Eigen::SparseMatrix<double> matrix = which.all;
     for (Eigen::Index column = 0; column < matrix.outerSize(); ++column)
       for (Eigen::SparseMatrix<double>::InnerIterator at(matrix, column); at; ++at) {
         const bool diagonal = at.row() == column;
@@ -364,29 +428,30 @@ class Problem {
         else if (diagonal)
           at.valueRef() += added[column];
       }
-    solver_.factorize(matrix);
-    return solver_.info() == Eigen::Success;
+    which.factors->factorize(matrix);
+    return which.factors->info() == Eigen::Success;
   }
 
   /// Comes near the solution through positive reactions and openings, by the predictor and corrector of Mehrotra (SIAM
   /// J. Optim. 2 (1992) 575; Nocedal, Wright, Numerical Optimization, ch. 16.6): in about 20 rounds, however large the
   /// cluster is. Ends where reactions times openings are on average below the square of `close` times the largest gap.
   /// Returns false if no reactions seem to hold the contacts, as where walls squeeze a sphere.
-  bool approach(const Eigen::VectorXd& gap, double close, Eigen::VectorXd& reaction, Eigen::VectorXd& opening) {
+  bool approach(Cluster& which, const Eigen::VectorXd& gap, double close, Eigen::VectorXd& reaction,
+                Eigen::VectorXd& opening) {
     const auto count = static_cast<double>(gap.size());
     const double wanted = close * gap.cwiseAbs().maxCoeff();
     const std::vector<char> every(gap.size(), 1);
     bool possible = false;
     for (int round = 0; round < kRounds; ++round) {
-      const Eigen::VectorXd off = opening - all_.template selfadjointView<Eigen::Lower>() * reaction - gap;
+      const Eigen::VectorXd off = opening - which.all.template selfadjointView<Eigen::Lower>() * reaction - gap;
       const double mean = reaction.dot(opening) / count;
       possible = off.cwiseAbs().maxCoeff() <= wanted;
       if (possible && mean <= wanted * wanted) break;
       const Eigen::VectorXd ratio = opening.cwiseQuotient(reaction);
-      if (!factor(every, (ratio.array() + kInteriorProximal).matrix())) break;
+      if (!factor(which, every, (ratio.array() + kInteriorProximal).matrix())) break;
       Eigen::VectorXd step, opens, target = Eigen::VectorXd::Zero(gap.size());
       const auto longest = [&] {  // the share of the step that keeps all reactions and openings positive
-        step = solver_.solve(off - opening + target);
+        step = which.factors->solve(off - opening + target);
         opens = target - opening - ratio.cwiseProduct(step);
         double share = 1;
         for (Eigen::Index k = 0; k < gap.size(); ++k) {
@@ -406,34 +471,46 @@ class Problem {
     return possible;
   }
 
-  std::span<RestingContact<D>> contacts_;
-  std::span<Vec<D>> w_;
   bool tied_;
+  std::vector<EventKey<D>> keys_;  // of the contacts
   std::vector<Body> bodies_;
   std::vector<Arm> arms_;
-  std::vector<char> active_;         // by contact of the cluster that is being solved
-  std::vector<char> factored_;       // the contacts that solver_ holds the factors for,
-  Eigen::VectorXd added_;            // and what was added to their diagonal
-  Eigen::SparseMatrix<double> all_;  // the lower half of the matrix of the cluster
+  std::vector<Cluster> clusters_;
+  std::span<RestingContact<D>> contacts_;
+  std::span<Vec<D>> w_;
+  std::vector<char> active_;  // by contact of the cluster that is being solved
   double proximal_ = 0;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver_;
 };
 
-}  // namespace
+template <int D>
+ReactionSolver<D>::ReactionSolver() = default;
+template <int D>
+ReactionSolver<D>::~ReactionSolver() = default;
 
 template <int D>
-bool solve_reactions(std::span<RestingContact<D>> contacts, const std::vector<double>& mass, std::span<Vec<D>> w,
-                     double* lost) {
-  return contacts.empty() || Problem<D>(contacts, mass, w, false).solve(lost);
+void ReactionSolver<D>::forget() {
+  problem_.reset();
+}
+
+template <int D>
+bool ReactionSolver<D>::solve(std::span<RestingContact<D>> contacts, const std::vector<double>& mass,
+                              std::span<Vec<D>> w, double* lost) {
+  if (contacts.empty()) return true;
+  if (!problem_ || !problem_->suits(contacts)) problem_ = std::make_unique<Problem>(contacts, mass, false);
+  problem_->begin(contacts, w);
+  return problem_->solve(lost);
 }
 
 template <int D>
 double keep_tangential(std::span<RestingContact<D>> contacts, const std::vector<double>& mass, std::span<Vec<D>> v) {
-  return contacts.empty() ? 0 : Problem<D>(contacts, mass, v, true).solve_and_stretch();
+  if (contacts.empty()) return 0;
+  typename ReactionSolver<D>::Problem problem(contacts, mass, true);
+  problem.begin(contacts, v);
+  return problem.solve_and_stretch();
 }
 
-template bool solve_reactions<2>(std::span<RestingContact<2>>, const std::vector<double>&, std::span<Vec<2>>, double*);
-template bool solve_reactions<3>(std::span<RestingContact<3>>, const std::vector<double>&, std::span<Vec<3>>, double*);
+template class ReactionSolver<2>;
+template class ReactionSolver<3>;
 template double keep_tangential<2>(std::span<RestingContact<2>>, const std::vector<double>&, std::span<Vec<2>>);
 template double keep_tangential<3>(std::span<RestingContact<3>>, const std::vector<double>&, std::span<Vec<3>>);
 

@@ -13,6 +13,7 @@
 // unique, though the motion is; there the matrix is singular. The proximal point method (Rockafellar, SIAM J. Control
 // Optim. 14 (1976) 877) adds a small diagonal to it and removes the effect on the motion by repetition.
 
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -43,12 +44,33 @@ struct RestingContact {
   double force = 0;   ///< the force of this reaction in the last piece with the contact held [force]
 };
 
-/// Finds the reactions and adds their effect to w. The iteration starts from the given lambdas; if they already solve
-/// the problem to rounding, they are left unchanged. The last bits of the result depend on the order of the contacts:
-/// sort them. `lost` receives the decrease of ½ Σ m w². Returns false if the problem was not solved to rounding.
+/// Finds reactions. It keeps the factors of the last solution, which serve again as long as the contacts are the same
+/// and their normals have hardly changed; so the last bits of a result depend on what was solved since forget().
+template <int D>
+class ReactionSolver {
+ public:
+  ReactionSolver();
+  ~ReactionSolver();
+  void forget();
+
+  /// Finds the reactions and adds their effect to w. The iteration starts from the given lambdas; if they already solve
+  /// the problem to rounding, they are left unchanged. The last bits of the result depend on the order of the contacts:
+  /// sort them. `lost` receives the decrease of ½ Σ m w². Returns false if the problem was not solved to rounding.
+  bool solve(std::span<RestingContact<D>> contacts, const std::vector<double>& mass, std::span<Vec<D>> w,
+             double* lost = nullptr);
+
+  class Problem;
+
+ private:
+  std::unique_ptr<Problem> problem_;
+};
+
+/// Finds reactions once.
 template <int D>
 bool solve_reactions(std::span<RestingContact<D>> contacts, const std::vector<double>& mass, std::span<Vec<D>> w,
-                     double* lost = nullptr);
+                     double* lost = nullptr) {
+  return ReactionSolver<D>().solve(contacts, mass, w, lost);
+}
 
 /// Removes the normal velocity, of either sign, from contacts that stay closed. The tangential motion of each cluster
 /// is rescaled so that its kinetic energy and its momentum along axes without walls are conserved. Returns the energy
