@@ -378,10 +378,12 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     for (Id i = 0; i < p.size(); ++i) v_end_[i] = v[i] + h * (mean_[i] - a_[i]);
     ExactSeries missing_here, kinetic;
     double pressing = 0;  // Σ |F| |x| of reactions
+    double stopped = 0;   // energy that contacts have dissipated that are held
     if (resting()) {      // then every rank has all particles
       const double lost = core_->scan().slide(x, v_end_, h);
+      if (lost > 0 && lost <= core_->scan().most_lost_at_rest(x)) stopped = lost;
       if (system.decomposition.ranks().rank() == 0) {
-        missing_here.add(lost);
+        missing_here.add(lost - stopped);
         for (const auto& contact : core_->scan().resting()) {
           const Id lo = contact.key.lo, hi = contact.key.hi;
           Vec<D> moved = x[lo] - p.x[lo];
@@ -408,7 +410,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     const bool dissipates = !system.box.contacts.elastic();
     // The stretch is √(1 + share) − 1, computed without cancellation.
     balance_ = {.owed = dissipates ? 0 : left,
-                .dissipated = dissipates ? left : 0,
+                .dissipated = dissipates ? left + stopped : 0,
                 .folded = folds ? std::abs(r) : 0,
                 .stretch = folds && r != 0 ? share / (1 + std::sqrt(1 + share)) : 0};
     if (any_freezes_)

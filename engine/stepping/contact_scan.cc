@@ -116,21 +116,13 @@ void ContactScan<D>::sort_out(Positions<D> v, bool all_stop) {
   approaching_.clear();
   resting_.clear();
   for (const Touch<D>& touch : touching_) {
-    const double speed = normal_speed(touch, v), resting = resting_speed(touch, v);
-    const bool fast = speed < -rest_.stopping_speed(touch.key, touch.normal, touch.force, resting);
-    if (fast && !touch.may_hit) continue;
-    if (fast && !(all_stop && rest_.dissipates(touch.key)))
+    const Next its = next(touch, v);
+    if (its == Next::parts || (its == Next::hits && !touch.may_hit)) continue;
+    if (its == Next::hits && !(all_stop && rest_.dissipates(touch.key)))
       approaching_.push_back(touch);
-    else if (speed <= rest_.holding_speed(touch.key, touch.normal, touch.force, resting))
+    else
       resting_.push_back({.key = without_time(touch.key), .normal = touch.normal, .force = touch.force});
   }
-}
-
-template <int D>
-double ContactScan<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo,
-                                      const Vec<D>& v_hi) const {
-  const double force = rest_.known_force(key);
-  return rest_.stopping_speed(key, normal, force, rest_.resting_speed(key, normal, force, v_lo, v_hi));
 }
 
 template <int D>
@@ -182,8 +174,8 @@ double ContactScan<D>::resolve(double time, Positions<D> x, Vectors<D> v, const 
     sort_out(v, all_stop);  // a sphere that was stopped may have been moving away from another contact
     // Another generation follows while a contact approaches faster than a resting one may, but not without end.
     const auto still_approaches = [&](const Touch<D>& touch) {
-      const double speed = normal_speed(touch, v);
-      return speed < -resting_speed(touch, v) && (touch.may_hit || speed >= -stopping_speed(touch, v));
+      const Next its = next(touch, v);
+      return its == Next::stops || (its == Next::hits && touch.may_hit);
     };
     if (approaching_.empty() &&
         !(dissipative && generation < 2 * kMostBounces && std::ranges::any_of(touching_, still_approaches)))
@@ -199,7 +191,7 @@ void ContactScan<D>::one_by_one(std::uint32_t generation, Positions<D> x, Vector
                                 const ApplyImpulse<D>& impulse) {
   for (Touch<D>& touch : approaching_) {
     // An earlier impulse of this generation may have separated the spheres.
-    if (!(normal_speed(touch, v) < -stopping_speed(touch, v))) continue;
+    if (next(touch, v) != Next::hits) continue;
     touch.key.generation = generation;
     if (generation > kMostGenerations)
       throw Error(Failure::numerical, partners(touch.key, box_) +
@@ -286,7 +278,7 @@ void ContactScan<D>::hold(Positions<D> v, Vectors<D> a, double time_left) {
     bool suits = true;
     for (auto& contact : resting_) {
       contact.slack = 0;
-      const double bound = least_opening(contact.key, v, a, time_left);
+      const double bound = least_opening(contact, v, a, time_left);
       if (round > 0) {
         const Vec<D> between =
             contact.key.kind == EventKind::pair ? Vec<D>(a[contact.key.lo] - a[contact.key.hi]) : a[contact.key.lo];
@@ -302,13 +294,19 @@ void ContactScan<D>::hold(Positions<D> v, Vectors<D> a, double time_left) {
                 [](const auto& contact) { return contact.lambda == 0; });  // these separate, and may meet again
 }
 
-/// The least acceleration, times the length of the normal, at which a resting contact opens, so that the spheres do not
-/// overlap within `time_left` under the accelerations a.
+/// The least acceleration, times the length of the normal, at which the spheres of a resting contact do not overlap
+/// within `time_left` under the accelerations a. A contact that opens, as fast as one at rest may, closes again.
 template <int D>
-double ContactScan<D>::least_opening(const EventKey<D>& key, Positions<D> v, Positions<D> a, double time_left) const {
-  if (key.kind != EventKind::pair) return box_.wall(key.hi).acceleration;
+double ContactScan<D>::least_opening(const RestingContact<D>& contact, Positions<D> v, Positions<D> a,
+                                     double time_left) const {
+  const auto& [key, normal] = std::tie(contact.key, contact.normal);
+  const auto closing = [&](double opening) { return -2 * std::max(0.0, opening) / time_left; };
+  if (key.kind != EventKind::pair) {
+    const Wall<D> wall = box_.wall(key.hi);
+    return wall.acceleration + closing(wall.opening(v[key.lo], 0));
+  }
   const Vec<D> u = v[key.lo] - v[key.hi];
-  return std::max(0.0, -u.dot(a[key.lo] - a[key.hi])) * time_left - u.squaredNorm();
+  return std::max(0.0, -u.dot(a[key.lo] - a[key.hi])) * time_left - u.squaredNorm() + closing(normal.dot(u));
 }
 
 template <int D>
@@ -412,6 +410,16 @@ double ContactScan<D>::slide(Positions<D> x, Vectors<D> v, double later) {
     contact.bound = wall_speed(contact.key, later);
   }
   return keep_tangential<D>(held, particles_.mass, v);
+}
+
+template <int D>
+double ContactScan<D>::most_lost_at_rest(Positions<D> x) const {
+  double lost = 0;
+  for (const auto& [key, normal_at_start, bound, slack, lambda, force] : resting_) {
+    const double speed = rest_.rest_speed(key, normal(key, x));
+    lost += 0.5 * speed * speed / rest_.inverse_mass(key);
+  }
+  return lost;
 }
 
 template <int D>

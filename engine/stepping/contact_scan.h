@@ -94,6 +94,8 @@ class ContactScan {
   /// (the normal velocity that a held piece of finite length leaves would make the pair bounce at once). Returns the
   /// energy that is missing afterwards. The piece ends `later` after the present time of the box.
   double slide(Positions<D> x, Vectors<D> v, double later = 0);
+  /// The most that resting contacts which dissipate may lose because they approach, or open, below their rest speeds.
+  double most_lost_at_rest(Positions<D> x) const;
 
   /// The candidate pairs, for methods that search for contacts themselves.
   NeighbourList<D>& list() { return list_; }
@@ -128,9 +130,10 @@ class ContactScan {
 
   /// See RestCriterion::rounding_speed.
   double rounding_speed(Id i, const Vec<D>& v) const { return rest_.rounding_speed(i, v); }
-  /// A contact stops if the spheres approach more slowly than this: the resting speed or, if it dissipates, the rest
-  /// speed of its law. `normal` may have any length.
-  double stopping_speed(const EventKey<D>& key, const Vec<D>& normal, const Vec<D>& v_lo, const Vec<D>& v_hi) const;
+  /// What a contact with this normal, of any length, and normal speed does next.
+  Next next(const EventKey<D>& key, const Vec<D>& normal, double speed, const Vec<D>& v_lo, const Vec<D>& v_hi) const {
+    return rest_.limits(key, normal, rest_.known_force(key), v_lo, v_hi).next(speed);
+  }
 
   RestCriterion<D>& rest() { return rest_; }
   const RestCriterion<D>& rest() const { return rest_; }
@@ -148,12 +151,9 @@ class ContactScan {
   double rounding_speed(const EventKey<D>& key, Positions<D> v) const {
     return rounding_speed(key.lo, v[key.lo]) + (key.kind == EventKind::pair ? rounding_speed(key.hi, v[key.hi]) : 0.0);
   }
-  double resting_speed(const Touch<D>& touch, Positions<D> v) const {
-    return rest_.resting_speed(touch.key, touch.normal, touch.force, v[touch.key.lo],
-                               v[touch.pair() ? touch.key.hi : touch.key.lo]);
-  }
-  double stopping_speed(const Touch<D>& touch, Positions<D> v) const {
-    return rest_.stopping_speed(touch.key, touch.normal, touch.force, resting_speed(touch, v));
+  Next next(const Touch<D>& touch, Positions<D> v) const {
+    const Vec<D>&v_lo = v[touch.key.lo], &v_hi = touch.pair() ? v[touch.key.hi] : v_lo;
+    return rest_.limits(touch.key, touch.normal, touch.force, v_lo, v_hi).next(normal_speed(touch, v));
   }
   void one_by_one(std::uint32_t generation, Positions<D> x, Vectors<D> v, const ApplyImpulse<D>& impulse);
   /// `gained`: the change of the kinetic energy of lo.
@@ -165,7 +165,7 @@ class ContactScan {
   double count_push(const RestingContact<D>& contact, double impulse, double speed);
   double stop_rounding(Vectors<D> v) const;
   Vec<D> normal(const EventKey<D>& key, Positions<D> x) const { return contact_normal<D>(box_, key, x); }
-  double least_opening(const EventKey<D>& key, Positions<D> v, Positions<D> a, double time_left) const;
+  double least_opening(const RestingContact<D>& contact, Positions<D> v, Positions<D> a, double time_left) const;
   double normal_slack(const RestingContact<D>& contact, Positions<D> v) const;
   bool press_apart(Vectors<D> w, double force);
   double normal_speed(const Touch<D>& touch, Positions<D> v) const;

@@ -84,29 +84,19 @@ double RestCriterion<D>::rest_speed(const EventKey<D>& key, const Vec<D>& normal
 }
 
 template <int D>
-double RestCriterion<D>::resting_speed(const EventKey<D>& key, const Vec<D>& normal, double force, const Vec<D>& v_lo,
-                                       const Vec<D>& v_hi) const {
+RestLimits RestCriterion<D>::limits(const EventKey<D>& key, const Vec<D>& normal, double force, const Vec<D>& v_lo,
+                                    const Vec<D>& v_hi) const {
   const bool pair = key.kind == EventKind::pair;
-  // Nothing rests on a thermal wall.
-  if (!pair && !box_.options.empty() && box_.wall(key.hi).thermal()) return -std::numeric_limits<double>::min();
+  if (!pair && !box_.options.empty() && box_.wall(key.hi).thermal()) {
+    constexpr double kNothing = -std::numeric_limits<double>::min();
+    return {kNothing, kNothing, kNothing};
+  }
   const double rounding = rounding_speed(key.lo, v_lo) + (pair ? rounding_speed(key.hi, v_hi) : 0.0);
   const double closing = pressing(key, normal, force);
-  if (!(closing > 0)) return rounding;
-  return std::max(rounding, speed_of_rest(closing, distance(key)));
-}
-
-template <int D>
-double RestCriterion<D>::stopping_speed(const EventKey<D>& key, const Vec<D>& normal, double force,
-                                        double resting) const {
-  if (resting < 0 || !dissipates(key)) return resting;
-  return std::max(resting, slowest_impact(key, normal, pressing(key, normal, force)));
-}
-
-template <int D>
-double RestCriterion<D>::holding_speed(const EventKey<D>& key, const Vec<D>& normal, double force,
-                                       double resting) const {
-  if (resting < 0 || lets_open_ || !dissipates(key)) return resting;
-  return std::max(resting, slowest_bounce(key, normal, pressing(key, normal, force)));
+  const double resting = closing > 0 ? std::max(rounding, speed_of_rest(closing, distance(key))) : rounding;
+  if (!dissipates(key)) return {resting, resting, resting};
+  return {resting, std::max(resting, slowest_impact(key, normal, closing)),
+          lets_open_ ? resting : std::max(resting, slowest_bounce(key, normal, closing))};
 }
 
 /// A contact that dissipates stops if it approaches more slowly than this.
@@ -130,7 +120,7 @@ double RestCriterion<D>::slowest_bounce(const EventKey<D>& key, const Vec<D>& no
 template <int D>
 double RestCriterion<D>::widest_gap(const EventKey<D>& key, const Vec<D>& normal) const {
   if (!dissipates(key)) return 0;
-  if (!kicks()) return gap_of(rest_speed(key, normal), strongest(key));
+  if (!kicks()) return gap_of(rest_speed(key, normal), strongest(key), distance(key));
   const double both = acceleration(key.lo) + (key.kind == EventKind::pair ? acceleration(key.hi) : 0.0);
   return 0.125 * length_ * length_ * both;
 }
@@ -149,7 +139,7 @@ double RestCriterion<D>::widest_gap() const {
     fastest = std::max(fastest, law.slowest(box_.contacts.thermal_speed));
     if (law.rest_speed < 0) fastest = std::max(fastest, std::sqrt(2 * strongest * kRestHeight * 2 * widest));
   }
-  return gap_of(fastest, 0);
+  return std::max(kOfHeight * kRestHeight * 2 * widest, fastest * length_);
 }
 
 template <int D>

@@ -4,20 +4,22 @@
 // without end. Contacts that dissipate also rest below the rest speed of their law.
 //
 //   from      to        when; u is the normal speed, positive where the gap opens   energy
-//   free      touching  the gap is rounding or, with a law, at most widest_gap()    none
-//   touching  touching  u < −stopping_speed(): an impulse, if the gap is closed     ½ m (1 − e²) u² dissipated
-//                       or a partner touches another sphere
-//   touching  held      −stopping_speed() ≤ u < 0: a reaction stops the approach    ½ m u² dissipated; without a
-//                                                                                   law returned (edda, cdda)
-//   touching  held      0 ≤ u ≤ holding_speed()                                     none
-//   touching  free      u > holding_speed()                                         none
+//   free      touching  gap ≤ noticed_gap()                                         none
+//   touching  touching  Next::hits, u < −stopping: an impulse, if the gap is        ½ m (1 − e²) u² dissipated
+//                       closed or a partner touches another sphere
+//   touching  held      Next::stops, −stopping ≤ u < −resting: a reaction stops     ½ m u² dissipated; without a
+//                       the approach                                                law returned (edda, cdda)
+//   touching  held      Next::rests, −resting ≤ u ≤ holding: so does a reaction,    as above, at the end of the piece
+//                       or the contact closes again at the end of the piece
+//   touching  free      Next::parts, u > holding                                    none
 //   held      held      the reaction that keeps it from approaching is positive     its work: of a wall, or folded
 //   held      free      that reaction is zero                                       none
 //   held      touching  a partner is hit, or the contact falls back: the piece      none
 //                       ends there
 //
-// ContactScan::sort_out() decides between the rows from `touching`, ContactScan::hold() and hold_means() between those
-// from `held`, SlabCore::serve() finds what ends a piece.
+// RestCriterion::limits() gives the three speeds. ContactScan::find_touching() notices contacts, sort_out() decides
+// between the rows from `touching`, hold() and hold_means() between those from `held`, and SlabCore::serve() finds what
+// ends a piece.
 
 #include <algorithm>
 #include <cmath>
@@ -32,6 +34,26 @@
 #include "engine/stepping/resting.h"
 
 namespace carom {
+
+/// What a contact that touches does next.
+enum class Next { hits, stops, rests, parts };
+
+/// The normal speeds that decide this.
+struct RestLimits {
+  /// The rounding error, or a speed at which the forces on the spheres close the contact again before it has opened by
+  /// kRestingGap.
+  double resting;
+  /// The resting speed or, if the contact dissipates, the rest speed of its law, and what kicks add to it.
+  double stopping;
+  /// The resting speed or, if the contact dissipates, one at which it closes again within the step so slowly that it
+  /// stops.
+  double holding;
+  Next next(double u) const {
+    if (u < -stopping) return Next::hits;
+    if (u < -resting) return Next::stops;
+    return u <= holding ? Next::rests : Next::parts;
+  }
+};
 
 /// A resting contact and the force that keeps its spheres apart.
 template <int D>
@@ -76,6 +98,10 @@ class RestCriterion {
   double distance(const EventKey<D>& key) const {
     return particles_.radius[key.lo] + (key.kind == EventKind::pair ? particles_.radius[key.hi] : 0.0);
   }
+  /// Of the reduced mass of the partners.
+  double inverse_mass(const EventKey<D>& key) const {
+    return 1 / particles_.mass[key.lo] + (key.kind == EventKind::pair ? 1 / particles_.mass[key.hi] : 0.0);
+  }
   /// The reaction of the last piece; 0 if there is none.
   double known_force(const EventKey<D>& key) const;
   /// Whether the law of the contact takes energy. That of a thermal wall has no effect.
@@ -89,20 +115,14 @@ class RestCriterion {
     if (!pressed_.empty()) speed += length_ * pressed_[i];
     return kRounding * speed;
   }
-  /// A contact with this normal (of any length) and reaction rests below this normal speed: the rounding error, or a
-  /// speed at which the forces on the spheres close the contact again before it has opened by kRestingGap.
-  double resting_speed(const EventKey<D>& key, const Vec<D>& normal, double force, const Vec<D>& v_lo,
-                       const Vec<D>& v_hi) const;
-  /// It stops if the spheres approach more slowly than this: the resting speed or, if it dissipates, the rest speed of
-  /// its law.
-  double stopping_speed(const EventKey<D>& key, const Vec<D>& normal, double force, double resting) const;
-  /// It is held if it opens more slowly than this: the resting speed or, if it dissipates, one at which it closes again
-  /// within the step so slowly that it stops.
-  double holding_speed(const EventKey<D>& key, const Vec<D>& normal, double force, double resting) const;
+  /// For a contact with this normal (of any length) and reaction. Nothing rests on a thermal wall.
+  RestLimits limits(const EventKey<D>& key, const Vec<D>& normal, double force, const Vec<D>& v_lo,
+                    const Vec<D>& v_hi) const;
   /// The largest gap of this contact from which a slow approach stops, and with which it is held; 0 unless it
-  /// dissipates. It is a quarter of the height from which a fall gives the rest speed, but at least what a sphere
-  /// crosses at that speed in a 64th of the step, and at most in all of it; see rest_criterion.cc for methods that
-  /// kick.
+  /// dissipates. It is a quarter of the height from which a fall gives the rest speed, or of kRestHeight contact
+  /// distances if this is less, but at least what a sphere crosses at that speed in a 64th of the step. It must not
+  /// shrink with the step: what is held would fall when a step is shorter. Without forces nothing is held, and it is
+  /// the path of a step. See rest_criterion.cc for methods that kick.
   double widest_gap(const EventKey<D>& key, const Vec<D>& normal) const;
   /// No widest_gap() is larger than this.
   double widest_gap() const;
@@ -121,17 +141,15 @@ class RestCriterion {
   double opening_by_forces(const EventKey<D>& key, const Vec<D>& normal) const;
   double slowest_impact(const EventKey<D>& key, const Vec<D>& normal, double closing) const;
   double slowest_bounce(const EventKey<D>& key, const Vec<D>& normal, double closing) const;
-  double inverse_mass(const EventKey<D>& key) const {
-    return 1 / particles_.mass[key.lo] + (key.kind == EventKind::pair ? 1 / particles_.mass[key.hi] : 0.0);
-  }
   double acceleration(Id i) const { return a_ && i < a_->size() ? (*a_)[i].norm() : 0; }
   double strongest(const EventKey<D>& key) const {
     return key.kind == EventKind::pair ? std::max(acceleration(key.lo), acceleration(key.hi)) : acceleration(key.lo);
   }
-  double gap_of(double speed, double strongest) const {
-    constexpr double kOfHeight = 0.25;
-    const double way = speed * length_, height = strongest > 0 ? speed * speed / (2 * strongest) : kNever;
-    return std::clamp(kOfHeight * height, way / kMostBounces, way);
+  static constexpr double kOfHeight = 0.25;
+  double gap_of(double speed, double strongest, double sigma) const {
+    if (!(strongest > 0)) return speed * length_;
+    const double height = std::min(speed * speed / (2 * strongest), kRestHeight * sigma);
+    return std::max(kOfHeight * height, speed * length_ / kMostBounces);
   }
   double speed_of_rest(double closing, double sigma) const {
     return std::min(std::sqrt(2 * closing * kRestingGap * sigma), 0.5 * closing * length_ / kMostBounces);

@@ -352,7 +352,7 @@ struct SlabCore<D>::Meeting {
 template <int D>
 bool SlabCore<D>::comes_to_rest(const EventKey<D>& key) const {
   const Meeting meeting(*this, key);
-  return meeting.speed >= -scan_->stopping_speed(key, meeting.normal, meeting.v_lo, meeting.v_hi);
+  return scan_->next(key, meeting.normal, meeting.speed, meeting.v_lo, meeting.v_hi) != Next::hits;
 }
 
 /// The time at which the gap is a quarter of the tolerance; that of the contact if this was before the start. If the

@@ -147,6 +147,39 @@ TEST(DissipativeContacts, ASmallGapThatWouldCloseIsHeld) {
   EXPECT_LT(run->statistics().max_energy_error, 1e-14);
 }
 
+/// The energy of a slow motion that would close the contact again within the step is dissipated: nothing else moves
+/// that could take it, and the step is not divided.
+TEST(DissipativeContacts, WhatOpensSlowlyAndIsHeldLosesItsEnergy) {
+  auto system = test::make_system<2>({6, 9}, Boundary::wall, {{3, 0.5}, {3, 1.500003}}, {{0, 0}, {0, 0.004}});
+  test::set_law<2>(*system, {{"restitution", 0.5}});
+  add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
+  const auto run = test::run_until<2>(std::move(system), "edda", 0.02, 0.1);
+  EXPECT_EQ(run->statistics().counters.pieces, 5u);
+  EXPECT_EQ(run->statistics().counters.slabs_halved, 0u);
+  EXPECT_NEAR(run->statistics().counters.dissipated.value(), 0.5 * 0.004 * 0.004, 1e-15);
+  EXPECT_LT(run->statistics().max_energy_error, 1e-14);
+}
+
+/// A ball that falls by 1 rests after the first impact that is slower than the rest speed, at the time of the formula
+/// 2 v/g for each flight, and stays at rest: in a last step that is shorter, too, and for 100 steps.
+TEST(DissipativeContacts, ABallRestsWhenItsImpactsAreSlow) {
+  for (const char* method : {"edda", "cdda", "cva", "mcva"})
+    for (const double e : {0.3, 0.7, 0.9})
+      for (const double rest_speed : {1e-6, 1e-2, 0.1}) {
+        SCOPED_TRACE(testing::Message() << method << ", e = " << e << ", rest speed " << rest_speed);
+        double time = std::sqrt(2.0);
+        std::uint64_t impacts = 0;
+        for (double speed = time; speed >= rest_speed; time += 2 * speed, ++impacts) speed *= e;
+        auto system = test::make_system<2>({5, 5}, Boundary::wall, {{2.5, 1.5}}, {{0, 0}});
+        test::set_law<2>(*system, {{"restitution", e}, {"rest_speed", rest_speed}});
+        add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
+        const auto run = test::run_until<2>(std::move(system), method, 0.02, time + 2.003);
+        EXPECT_EQ(run->statistics().counters.sphere_wall, impacts);
+        EXPECT_LT(run->system().particles.v[0].norm(), 1e-12);
+        EXPECT_NEAR(run->system().particles.x[0][1], 0.5, 1e-5 * 0.5);  // the gap from which approaches stop
+      }
+}
+
 /// What pieces with contacts at rest leave is folded: without this, the ledger of these discs is open by 9e-13.
 TEST(DissipativeContacts, CddaFoldsTheRoundingOfAPile) {
   auto system = test::make_system<2>({8.737, 15.2}, Boundary::periodic,

@@ -25,8 +25,11 @@ struct Two {
     criterion->begin_step(&a, step);
   }
   double rest_speed(const EventKey<2>& key) const { return criterion->rest_speed(key, normal(key)); }
+  RestLimits limits(const EventKey<2>& key, double force = 0, Vec<2> v = Vec<2>::Zero()) const {
+    return criterion->limits(key, normal(key), force, v, v);
+  }
   double resting(const EventKey<2>& key, double force = 0, Vec<2> v = Vec<2>::Zero()) const {
-    return criterion->resting_speed(key, normal(key), force, v, v);
+    return limits(key, force, v).resting;
   }
   Vec<2> normal(const EventKey<2>& key) const { return contact_normal<2>(system->box, key, system->particles.x); }
 
@@ -75,17 +78,22 @@ TEST(RestSpeed, OfAPowerLawStopsWhatTheLawWouldReturn) {
   const std::vector<Vec<2>> a = {{0, -1}};
   RestCriterion<2> criterion(power->box, power->particles, none);
   criterion.begin_step(&a, 0.1);
-  EXPECT_DOUBLE_EQ(criterion.stopping_speed(kFloor, {0, 1}, 0, 0), std::sqrt(1e-4 * 0.5));
+  EXPECT_DOUBLE_EQ(criterion.limits(kFloor, {0, 1}, 0, {0, 0}, {0, 0}).stopping, std::sqrt(1e-4 * 0.5));
 }
 
 TEST(RestSpeed, BoundsTheGapsFromWhichApproachesStop) {
   Two falls(kLaw, {{0, -1}, {0, -2}});
-  // A quarter of the height from which a fall at 2 gives the rest speed, or the way at that speed in the step.
+  // A quarter of the height from which a fall at 2 gives the rest speed, or the way at that speed in a 64th of the step.
   const double speed = falls.rest_speed(kPair);
-  falls.criterion->begin_step(&falls.a, 0.01);
-  EXPECT_DOUBLE_EQ(falls.criterion->widest_gap(kPair, falls.normal(kPair)), 0.25 * speed * speed / (2 * 2));
-  falls.criterion->begin_step(&falls.a, 1e-4);
-  EXPECT_DOUBLE_EQ(falls.criterion->widest_gap(kPair, falls.normal(kPair)), speed * 1e-4);
+  for (const double step : {1e-2, 1e-6}) {
+    falls.criterion->begin_step(&falls.a, step);
+    EXPECT_DOUBLE_EQ(falls.criterion->widest_gap(kPair, falls.normal(kPair)), 0.25 * speed * speed / (2 * 2));
+  }
+  const Two fast({{"restitution", 0.5}, {"rest_speed", 0.3}}, {{0, -1}, {0, -2}}, {}, 1e-4);
+  EXPECT_DOUBLE_EQ(fast.criterion->widest_gap(kPair, fast.normal(kPair)), 0.25 * kRestHeight * 1.0);
+  const Two free({{"restitution", 0.5}, {"rest_speed", 0.3}}, {{0, 0}, {0, 0}}, {}, 1e-4);
+  EXPECT_DOUBLE_EQ(free.criterion->widest_gap(kPair, free.normal(kPair)), 0.3 * 1e-4);
+  EXPECT_GE(free.criterion->widest_gap(), 0.3 * 1e-4);
   falls.criterion->begin_step(&falls.a, 10);
   EXPECT_DOUBLE_EQ(falls.criterion->widest_gap(kPair, falls.normal(kPair)), speed * 10 / kMostBounces);
   EXPECT_GE(falls.criterion->widest_gap(), falls.criterion->widest_gap(kPair, falls.normal(kPair)));
@@ -139,35 +147,37 @@ TEST(RestingSpeed, AFloorThatComesUpPresses) {
 TEST(RestingSpeed, NothingRestsOnAThermalWall) {
   Two hot({{"restitution", 0.5}}, {{0, -1}, {0, -1}});
   hot.system->box.add({.name = "y-", .temperature = 2.0});
-  const double resting = hot.resting(kFloor);
-  EXPECT_LT(resting, 0);
-  EXPECT_EQ(hot.criterion->stopping_speed(kFloor, hot.normal(kFloor), 0, resting), resting);
-  EXPECT_EQ(hot.criterion->holding_speed(kFloor, hot.normal(kFloor), 0, resting), resting);
+  const RestLimits limits = hot.limits(kFloor);
+  EXPECT_LT(limits.resting, 0);
+  EXPECT_EQ(limits.stopping, limits.resting);
+  EXPECT_EQ(limits.holding, limits.resting);
+  EXPECT_EQ(limits.next(0), Next::hits);  // the wall gives it a velocity
   EXPECT_EQ(hot.rest_speed(kFloor), 0);
 }
 
 TEST(StoppingSpeed, KicksStopOnlyWhatHasALaw) {
   Two elastic({{"between", std::vector<std::string>{"*", "y-"}}, {"restitution", 0.5}}, {{0, 0}, {0, -2}});
   elastic.criterion->stop_within(0.1);
-  EXPECT_EQ(elastic.criterion->stopping_speed(kPair, elastic.normal(kPair), 0, 1e-9), 1e-9);
-  EXPECT_EQ(elastic.criterion->holding_speed(kPair, elastic.normal(kPair), 0, 1e-9), 1e-9);
+  EXPECT_EQ(elastic.limits(kPair).stopping, elastic.resting(kPair));
+  EXPECT_EQ(elastic.limits(kPair).holding, elastic.resting(kPair));
 }
 
 TEST(HoldingSpeed, IsThatOfABounceWithinTheStep) {
   Two falls({{"restitution", 0.5}, {"rest_speed", 0.05}}, {{0, 0}, {0, -2}});
-  const auto holding = [&] { return falls.criterion->holding_speed(kPair, falls.normal(kPair), 0, 0); };
+  const auto holding = [&] { return falls.limits(kPair).holding; };
   EXPECT_DOUBLE_EQ(holding(), 0.05);  // the rest speed
   falls.criterion->begin_step(&falls.a, 0.01);
   EXPECT_DOUBLE_EQ(holding(), 0.5 * 2 * 0.01);  // a flight that takes the whole step
   falls.criterion->let_open();
-  EXPECT_EQ(holding(), 0);
+  EXPECT_EQ(holding(), falls.resting(kPair));
 }
 
 TEST(RestSpeed, FallingBackPressesAContactOnce) {
   Two falls({{"restitution", 0.5}, {"rest_speed", 0.05}}, {{0, 0}, {0, 0}});
   const Vec<2> n = falls.normal(kPair);
-  const auto holding = [&] { return falls.criterion->holding_speed(kPair, n, 0, 0); };
+  const auto holding = [&] { return falls.limits(kPair).holding; };
   EXPECT_EQ(holding(), 0);  // nothing presses
+  EXPECT_EQ(falls.limits(kPair).next(1e-9), Next::parts);
   EXPECT_FALSE(falls.criterion->falls_back(kPair, n, 0, 0.01));
   EXPECT_FALSE(falls.criterion->falls_back(kPair, n, 2, 0.06));
   EXPECT_TRUE(falls.criterion->falls_back(kPair, n, 2, 0.04));
@@ -175,6 +185,16 @@ TEST(RestSpeed, FallingBackPressesAContactOnce) {
   EXPECT_DOUBLE_EQ(holding(), 0.05);
   falls.criterion->begin_step(&falls.a, 0.1);
   EXPECT_EQ(holding(), 0);
+}
+
+TEST(RestLimits, DivideTheSpeedsIntoFour) {
+  const RestLimits limits{.resting = 1, .stopping = 3, .holding = 2};
+  EXPECT_EQ(limits.next(-3.1), Next::hits);
+  EXPECT_EQ(limits.next(-3), Next::stops);
+  EXPECT_EQ(limits.next(-1.1), Next::stops);
+  EXPECT_EQ(limits.next(-1), Next::rests);
+  EXPECT_EQ(limits.next(2), Next::rests);
+  EXPECT_EQ(limits.next(2.1), Next::parts);
 }
 
 }  // namespace
