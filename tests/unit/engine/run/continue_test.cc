@@ -236,6 +236,19 @@ TEST(Continue, StepsThatMethodsChoose) {
   divided.plan = plan_of(1, 3);
   compare<2>(divided, {{0, 0}, {2, 3}}, {5});
 }
+/// Two discs press three others apart, so that all contacts are held and turn. The sweeps of a step correct their
+/// reactions with the factors of the first sweep of this step, never with those of an earlier step.
+TEST(Continue, ContactsThatAreHeldAndTurn) {
+  const auto pile = [] {
+    const double top = 0.5 + std::sqrt(0.75);
+    auto system = test::make_system<2>({9, 9}, Boundary::wall, {{3, 0.5}, {4, 0.5}, {5, 0.5}, {3.5, top}, {4.5, top}},
+                                       std::vector<Vec<2>>(5, Vec<2>::Zero()));
+    test::set_law<2>(*system, {{"restitution", 0.5}});
+    test::add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
+    return system;
+  };
+  compare<2>({pile, "edda", plan_of(0.02, 12), {}, {}, false}, {{0, 0}, {2, 3}}, {2, 5, 9});
+}
 /// `slab_collisions`: far fewer than in an epoch, of which there are about 500 in 2.2 time units.
 Scene<3> fluid(std::optional<std::uint64_t> slab_collisions = {}) {
   return {[] { return test::hard_spheres<3>(6, 0.35); },
