@@ -15,6 +15,7 @@ sys.path.insert(0, str(ROOT / "tools"))
 
 import cost_study
 import energy_study
+import piles
 import rank_study
 import step_study
 import studies
@@ -109,6 +110,24 @@ def test_step_study(tmp_path, capsys):
     assert len(capsys.readouterr().out.splitlines()) == 1 + len(rows)
     with pytest.raises(SystemExit, match="^There is no mean height, only pressure, "):
         step_study.main([deck, "--steps", "0.1", "--end-time", "1", "--means", "height", "-o", str(tmp_path)])
+
+
+@needs_carom
+def test_piles(tmp_path, capsys):
+    assert piles.main(["balls", "--only", "e=0.5", "--methods", "edda,psa", "-o", str(tmp_path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 2 + 8 and lines[-1] == "8 runs, 0 not as they should be"
+    rest = [re.search(r"rest after ([\d.]+), formula ([\d.]+)$", line).groups() for line in lines[1:-1]]
+    assert [abs(float(found) - float(formula)) < 0.03 for found, formula in rest[::2]] == [True] * 4
+    assert piles.main(["random", "--seeds", "2", "--only", "seed=2", "--methods", "edda", "-o", str(tmp_path)]) == 0
+    assert piles.main(["balls", "--only", "e=0.5_rest=0.1", "--methods", "edda", "--carom", "/bin/false", "-o", str(tmp_path)]) == 1
+    assert "FAILS" in capsys.readouterr().out
+
+
+def test_overlaps_of_piles_are_those_of_all_frames(tmp_path):
+    x = np.array([[[9.2, 1.0], [0.1, 1.0]], [[9.0, 1.0], [0.1, 1.0]]])  # 0.9 and 1.1 apart across the periodic edge
+    write_run(tmp_path / "run", np.ones(2), x=x, v=np.zeros_like(x), edges=np.full(2, 10.0), boundary=["periodic", "wall"], radius=0.5)
+    assert piles.deepest_overlap(tmp_path / "run") == pytest.approx(0.1)
 
 
 def test_means_are_rounded_to_their_errors():
