@@ -378,10 +378,11 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     for (Id i = 0; i < p.size(); ++i) v_end_[i] = v[i] + h * (mean_[i] - a_[i]);
     ExactSeries missing_here, kinetic;
     double pressing = 0;  // Σ |F| |x| of reactions
-    double stopped = 0;   // energy that contacts have dissipated that are held
+    double stopped = 0;   // energy that held contacts have dissipated
     if (resting()) {      // then every rank has all particles
+      const bool slow = core_->scan().held_slowly(x, v_end_, h);
       const double lost = core_->scan().slide(x, v_end_, h);
-      if (lost > 0 && lost <= core_->scan().most_lost_at_rest(x)) stopped = lost;
+      if (slow && lost > 0) stopped = lost;
       if (system.decomposition.ranks().rank() == 0) {
         missing_here.add(lost - stopped);
         for (const auto& contact : core_->scan().resting()) {

@@ -295,12 +295,13 @@ void ContactScan<D>::hold(Positions<D> v, Vectors<D> a, double time_left) {
 }
 
 /// The least acceleration, times the length of the normal, at which the spheres of a resting contact do not overlap
-/// within `time_left` under the accelerations a. A contact that opens, as fast as one at rest may, closes again.
+/// within `time_left` under the accelerations a. A contact that opens, no faster than its holding
+/// speed, closes again.
 template <int D>
 double ContactScan<D>::least_opening(const RestingContact<D>& contact, Positions<D> v, Positions<D> a,
                                      double time_left) const {
   const auto& [key, normal] = std::tie(contact.key, contact.normal);
-  const auto closing = [&](double opening) { return -2 * std::max(0.0, opening) / time_left; };
+  const auto closing = [&](double opening) { return time_left > 0 ? -2 * std::max(0.0, opening) / time_left : 0; };
   if (key.kind != EventKind::pair) {
     const Wall<D> wall = box_.wall(key.hi);
     return wall.acceleration + closing(wall.opening(v[key.lo], 0));
@@ -413,13 +414,13 @@ double ContactScan<D>::slide(Positions<D> x, Vectors<D> v, double later) {
 }
 
 template <int D>
-double ContactScan<D>::most_lost_at_rest(Positions<D> x) const {
-  double lost = 0;
-  for (const auto& [key, normal_at_start, bound, slack, lambda, force] : resting_) {
-    const double speed = rest_.rest_speed(key, normal(key, x));
-    lost += 0.5 * speed * speed / rest_.inverse_mass(key);
-  }
-  return lost;
+bool ContactScan<D>::held_slowly(Positions<D> x, Positions<D> v, double later) const {
+  return std::ranges::all_of(resting_, [&](const RestingContact<D>& contact) {
+    if (contact.force == 0) return true;
+    const EventKey<D>& key = contact.key;
+    const Touch<D> touch{.key = key, .normal = normal(key, x), .speed = wall_speed(key, later)};
+    return std::abs(normal_speed(touch, v)) <= std::max(rounding_speed(key, v), rest_.rest_speed(key, touch.normal));
+  });
 }
 
 template <int D>

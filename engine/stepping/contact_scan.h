@@ -94,8 +94,9 @@ class ContactScan {
   /// (the normal velocity that a held piece of finite length leaves would make the pair bounce at once). Returns the
   /// energy that is missing afterwards. The piece ends `later` after the present time of the box.
   double slide(Positions<D> x, Vectors<D> v, double later = 0);
-  /// The most that resting contacts which dissipate may lose because they approach, or open, below their rest speeds.
-  double most_lost_at_rest(Positions<D> x) const;
+  /// Whether all held contacts approach or open more slowly than their rest speeds, so that slide() ends slow motion
+  /// and does not turn a fast pair.
+  bool held_slowly(Positions<D> x, Positions<D> v, double later = 0) const;
 
   /// The candidate pairs, for methods that search for contacts themselves.
   NeighbourList<D>& list() { return list_; }

@@ -38,7 +38,7 @@ namespace carom {
 /// What a contact that touches does next.
 enum class Next { hits, stops, rests, parts };
 
-/// The normal speeds that decide this.
+/// The normal speeds that decide what a contact does next.
 struct RestLimits {
   /// The rounding error, or a speed at which the forces on the spheres close the contact again before it has opened by
   /// kRestingGap.
@@ -98,10 +98,6 @@ class RestCriterion {
   double distance(const EventKey<D>& key) const {
     return particles_.radius[key.lo] + (key.kind == EventKind::pair ? particles_.radius[key.hi] : 0.0);
   }
-  /// Of the reduced mass of the partners.
-  double inverse_mass(const EventKey<D>& key) const {
-    return 1 / particles_.mass[key.lo] + (key.kind == EventKind::pair ? 1 / particles_.mass[key.hi] : 0.0);
-  }
   /// The reaction of the last piece; 0 if there is none.
   double known_force(const EventKey<D>& key) const;
   /// Whether the law of the contact takes energy. That of a thermal wall has no effect.
@@ -115,14 +111,14 @@ class RestCriterion {
     if (!pressed_.empty()) speed += length_ * pressed_[i];
     return kRounding * speed;
   }
-  /// For a contact with this normal (of any length) and reaction. Nothing rests on a thermal wall.
+  /// The limits of a contact with this normal, of any length, and reaction. Nothing rests on a thermal wall.
   RestLimits limits(const EventKey<D>& key, const Vec<D>& normal, double force, const Vec<D>& v_lo,
                     const Vec<D>& v_hi) const;
   /// The largest gap of this contact from which a slow approach stops, and with which it is held; 0 unless it
   /// dissipates. It is a quarter of the height from which a fall gives the rest speed, or of kRestHeight contact
   /// distances if this is less, but at least what a sphere crosses at that speed in a 64th of the step. It must not
-  /// shrink with the step: what is held would fall when a step is shorter. Without forces nothing is held, and it is
-  /// the path of a step. See rest_criterion.cc for methods that kick.
+  /// shrink with the step: held spheres would fall in a shorter step. Without forces no contact is held; the gap is
+  /// then the rest speed times the step. See rest_criterion.cc for methods that kick.
   double widest_gap(const EventKey<D>& key, const Vec<D>& normal) const;
   /// No widest_gap() is larger than this.
   double widest_gap() const;
@@ -141,6 +137,9 @@ class RestCriterion {
   double opening_by_forces(const EventKey<D>& key, const Vec<D>& normal) const;
   double slowest_impact(const EventKey<D>& key, const Vec<D>& normal, double closing) const;
   double slowest_bounce(const EventKey<D>& key, const Vec<D>& normal, double closing) const;
+  double inverse_mass(const EventKey<D>& key) const {
+    return 1 / particles_.mass[key.lo] + (key.kind == EventKind::pair ? 1 / particles_.mass[key.hi] : 0.0);
+  }
   double acceleration(Id i) const { return a_ && i < a_->size() ? (*a_)[i].norm() : 0; }
   double strongest(const EventKey<D>& key) const {
     return key.kind == EventKind::pair ? std::max(acceleration(key.lo), acceleration(key.hi)) : acceleration(key.lo);

@@ -21,7 +21,7 @@ constexpr int kBeforeLowering = 4;  // repetitions with a raised proximal term, 
 // A solution is sought to the rounding of the two spheres of each contact. In a cluster with light loads beside heavy
 // ones this may be less than the rounding of the factors; then a solution is accepted that would also be kept.
 constexpr int kStrictRepetitions = 8;
-// Corrections with the factors of an earlier solution: each must leave less than this of the error.
+// Corrections with the factors of an earlier solution: each error must be at most kContraction of the one before.
 constexpr int kCorrections = 12;
 constexpr double kContraction = 0.2;
 constexpr int kExchanges = 50;

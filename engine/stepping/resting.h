@@ -65,7 +65,7 @@ class ReactionSolver {
   std::unique_ptr<Problem> problem_;
 };
 
-/// Finds reactions once.
+/// Finds reactions without keeping factors.
 template <int D>
 bool solve_reactions(std::span<RestingContact<D>> contacts, const std::vector<double>& mass, std::span<Vec<D>> w,
                      double* lost = nullptr) {

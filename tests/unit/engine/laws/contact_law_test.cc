@@ -158,6 +158,16 @@ TEST(DissipativeContacts, WhatOpensSlowlyAndIsHeldLosesItsEnergy) {
   EXPECT_EQ(run->statistics().counters.slabs_halved, 0u);
   EXPECT_NEAR(run->statistics().counters.dissipated.value(), 0.5 * 0.004 * 0.004, 1e-15);
   EXPECT_LT(run->statistics().max_energy_error, 1e-14);
+  // A column that rises: only the contact with the floor opens, and the discs of unequal masses have more energy than
+  // that of a rest speed.
+  auto column = test::make_system<2>({6, 9}, Boundary::wall, {{3, 0.5}, {3, 1.5}, {3, 2.5}},
+                                     std::vector<Vec<2>>(3, {0, 0.0095}), {}, {1, 3, 2});
+  test::set_law<2>(*column, {{"restitution", 0.5}, {"rest_speed", 0.01}});
+  add_interaction(*column, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
+  const auto fell = test::run_until<2>(std::move(column), "edda", 0.02, 0.1);
+  EXPECT_EQ(fell->statistics().counters.slabs_halved, 0u);
+  EXPECT_NEAR(fell->statistics().counters.dissipated.value(), 0.5 * 6 * 0.0095 * 0.0095, 1e-14);
+  EXPECT_LT(fell->statistics().max_energy_error, 1e-13);
 }
 
 /// A ball that falls by 1 rests after the first impact that is slower than the rest speed, at the time of the formula
