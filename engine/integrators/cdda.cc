@@ -105,7 +105,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     const double noise =
         kRoundingOfPieces * fastest(system.particles) * (1 / tau + (last_length_ > 0 ? 1 / last_length_ : 0));
     const LocalError error = local_error<D>(system, piece_->a(), last_a_, tau, last_length_, noise);
-    if (error.rate > report.error.rate) report.error = error;
+    report.error.add(error);
     need_accuracy(error, slab.accuracy, tau, slab.length);
     last_a_ = piece_->a();
     last_length_ = tau;

@@ -205,7 +205,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     const double scale = std::max(scales_.speed, piece * scales_.strength), before = past_.last_length();
     const double noise = tolerance_ * scale * (1 / piece + (before > 0 ? 1 / before : 0));
     const LocalError error = local_error<D>(system, resting() ? smooth_ : mean_, past_.last(), piece, before, noise);
-    if (error.rate > report_->error.rate) report_->error = error;
+    report_->error.add(error);
     need_accuracy(error, slab.accuracy, piece, slab.length);
   }
 

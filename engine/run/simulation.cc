@@ -407,7 +407,8 @@ void Simulation<D>::adapt(const Slab& slab, const SlabReport<D>& report, std::ui
     s.longest_step = std::max(s.longest_step, complete);
   }
   clock_.adapt(slab, report.error, contacts,
-               clock_.adapts() ? longest_step(*system_, plan_) : std::numeric_limits<double>::infinity());
+               clock_.adapts() ? longest_step(*system_, plan_, report.error.strongest)
+                               : std::numeric_limits<double>::infinity());
 }
 
 /// Sets the times of a ramp of the bath's temperature, unless they are given or an earlier plan has set them.

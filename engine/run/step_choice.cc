@@ -63,27 +63,31 @@ double first_step(const System<D>& system, const Plan& plan) {
   Counters uncounted;
   evaluate_forces<D>(system, p.x, force, uncounted);
   const double distance = mean_distance(system);
-  double speed = 0, strength = 0;  // of the fastest and of the most accelerated particle, in diameters
+  double speed = 0, strength = 0, strongest = 0;  // the largest speed and acceleration, in diameters; the latter itself
   for (Id i = 0; i < p.size(); ++i) {
     if (p.fixed(i) || !p.owns(i)) continue;
     const double length = length_of_error(p.radius[i], distance);
     speed = std::max(speed, p.v[i].norm() / length);
-    strength = std::max(strength, force[i].norm() / (p.mass[i] * length));
+    const double acceleration = force[i].norm() / p.mass[i];
+    strength = std::max(strength, acceleration / length);
+    strongest = std::max(strongest, acceleration);
   }
-  std::array<double, 2> most{speed, strength};
+  std::array<double, 3> most{speed, strength, strongest};
   system.decomposition.ranks().largest(most);
   const double part = elementary::cbrt(plan.accuracy);
   const double length =
-      std::min({plan.step, part / most[0], std::sqrt(2 * part / most[1]), longest_step(system, plan)});
+      std::min({plan.step, part / most[0], std::sqrt(2 * part / most[1]), longest_step(system, plan, most[2])});
   return std::max(length, plan.shortest_step);
 }
 
 // A bath that acts at the ends of steps moves the kinetic energy by at most a tenth of its distance from the mean at
 // once. A particle flies no farther than a quarter of the longest edge, as in the slab core, since positions would lose
 // digits. It flies no farther than a quarter of the range of each force with a cutoff either: two particles that come
-// near feel the force in a step at least before they would have passed each other. If nothing moves, steps do not grow.
+// near feel the force in a step at least before they would have passed each other. Nor would the force on a particle at
+// rest move it farther: forces on spheres that hold each other, or balance each other, do not change, but the rounding
+// of what they would cause grows with the step. If nothing moves, steps do not grow.
 template <int D>
-double longest_step(const System<D>& system, const Plan& plan) {
+double longest_step(const System<D>& system, const Plan& plan, double strongest) {
   constexpr double kOfRelaxation = 0.1, kOfLength = 0.25;
   double shortest = system.box.edges.maxCoeff();
   for (const auto& term : system.interactions)
@@ -95,6 +99,7 @@ double longest_step(const System<D>& system, const Plan& plan) {
   const double fastest = std::sqrt(system.decomposition.largest(squared));
   const Bath& bath = system.box.bath;
   double longest = fastest > 0 ? kOfLength * shortest / fastest : plan.step;
+  if (strongest > 0) longest = std::min(longest, std::sqrt(2 * kOfLength * shortest / strongest));
   longest = std::min({longest, system.box.longest_step(),
                       plan.longest_step > 0 ? plan.longest_step : std::numeric_limits<double>::infinity()});
   if (bath.type != Bath::Type::none && bath.rate > 0) longest = std::min(longest, kOfRelaxation / bath.rate);
@@ -105,7 +110,7 @@ template void choose_step(const System<2>&, const IntegratorInfo&, const Plan&, 
 template void choose_step(const System<3>&, const IntegratorInfo&, const Plan&, Parameters&, double);
 template double first_step(const System<2>&, const Plan&);
 template double first_step(const System<3>&, const Plan&);
-template double longest_step(const System<2>&, const Plan&);
-template double longest_step(const System<3>&, const Plan&);
+template double longest_step(const System<2>&, const Plan&, double);
+template double longest_step(const System<3>&, const Plan&, double);
 
 }  // namespace carom

@@ -21,8 +21,9 @@ void set_steps(Plan& plan, const Parameters& parameters);
 template <int D>
 double first_step(const System<D>& system, const Plan& plan);
 
-/// The longest step that the plan, the walls, the bath and the fastest particle allow [time]. Collective.
+/// The longest step that the plan, the walls, the bath and the fastest particle allow [time], and the largest
+/// acceleration by forces, `strongest` [length/time²]. Collective.
 template <int D>
-double longest_step(const System<D>& system, const Plan& plan);
+double longest_step(const System<D>& system, const Plan& plan, double strongest);
 
 }  // namespace carom

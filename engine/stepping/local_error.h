@@ -6,9 +6,12 @@
 // rate j, the position at the end is wrong by ∫∫ j (t − h/2) dt dt = j h³/12. The mean accelerations a and a⁻ of this
 // step and the one before belong to the middles of the steps, so j = 2 |a − a⁻|/(h + h⁻).
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <tuple>
+#include <utility>
 
 #include "engine/ranks/system.h"
 
@@ -17,9 +20,14 @@ namespace carom {
 /// The largest local error of any particle, relative to its diameter; of a point: to the mean distance of the
 /// particles.
 struct LocalError {
-  double rate = 0;  ///< the error of a step of length h is rate · h³ [1/time³]
-  Id id = 0;        ///< the particle
+  double rate = 0;       ///< the error of a step of length h is rate · h³ [1/time³]
+  Id id = 0;             ///< the particle
+  double strongest = 0;  ///< the largest acceleration by forces [length/time²]
   double of(double length) const { return rate * length * length * length; }
+  void add(const LocalError& other) {
+    if (other.rate > rate) std::tie(rate, id) = std::pair(other.rate, other.id);
+    strongest = std::max(strongest, other.strongest);
+  }
 };
 
 /// Thrown on all ranks together: the slab is repeated with this length, because it is not accurate enough, has too many
@@ -40,18 +48,21 @@ LocalError local_error(const System<D>& system, Positions<D> a, Positions<D> a_b
                        double noise) {
   const auto& p = system.particles;
   const double distance = mean_distance(system);
-  double most = 0;  // of |a − a⁻|²/length²
+  double most = 0, strongest = 0;  // of |a − a⁻|²/length², |a|²
   Id worst = 0;
   for (Id i = 0; i < p.size(); ++i) {
     if (!p.owns(i)) continue;
+    strongest = std::max(strongest, a[i].squaredNorm());
     const double length = length_of_error(p.radius[i], distance);
     const double change = (a[i] - a_before[i]).squaredNorm(), relative = change / (length * length);
     if (change <= noise * noise || !(relative > most)) continue;
     most = relative;
     worst = i;
   }
-  const double all = system.decomposition.largest(most);
-  LocalError error{.rate = std::sqrt(all) / (6 * (h + h_before))};
+  std::array<double, 2> largest{most, strongest};
+  system.decomposition.ranks().largest(largest);
+  const double all = largest[0];
+  LocalError error{.rate = std::sqrt(all) / (6 * (h + h_before)), .strongest = std::sqrt(largest[1])};
   constexpr double kNone = -std::numeric_limits<double>::infinity();
   if (all > 0)  // the smallest id of the worst particles
     error.id =

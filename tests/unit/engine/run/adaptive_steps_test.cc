@@ -134,6 +134,21 @@ TEST(StepsOfTheirOwn, AreLimitedByShakenWallsAndBaths) {
             0.5);
 }
 
+/// Two discs that attract and hold each other move slowly together: nothing changes but their place. A force of 1 would
+/// move a disc at rest by a quarter of the edge in the longest step.
+TEST(StepsOfTheirOwn, DoNotGrowWithoutEndWhereForcesHoldSpheres) {
+  for (const char* method : {"edda", "cdda"}) {
+    SCOPED_TRACE(method);
+    auto system = test::make_system<2>(Vec<2>{18, 18}, Boundary::open, {{9, 9}, {10, 9}}, {{1e-3, 0}, {1e-3, 0}});
+    test::add_interaction(*system, "gravity", {{"constant", 1.0}});
+    auto run = test::make_run<2>(std::move(system), method, {.end_time = 200}, {{"accuracy", 1e-4}});
+    run->run();
+    EXPECT_LE(run->statistics().longest_step, std::sqrt(2 * 18 / 4.0));
+    EXPECT_GT(run->statistics().longest_step, 1);
+    EXPECT_NEAR(run->system().particles.x[0][0], 9.2, 1e-12);
+  }
+}
+
 TEST(StepsOfTheirOwn, AreRefusedByMethodsWhoseEnergyErrorWouldGrow) {
   for (const char* method : {"psa", "cva", "mcva", "verlet"}) {
     try {
