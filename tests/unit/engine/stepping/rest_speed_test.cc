@@ -83,7 +83,8 @@ TEST(RestSpeed, OfAPowerLawStopsWhatTheLawWouldReturn) {
 
 TEST(RestSpeed, BoundsTheGapsFromWhichApproachesStop) {
   Two falls(kLaw, {{0, -1}, {0, -2}});
-  // A quarter of the height from which a fall at 2 gives the rest speed, or the way at that speed in a 64th of the step.
+  // A quarter of the height from which a fall at 2 gives the rest speed, or the way at that speed in a 64th of the
+  // step.
   const double speed = falls.rest_speed(kPair);
   for (const double step : {1e-2, 1e-6}) {
     falls.criterion->begin_step(&falls.a, step);
