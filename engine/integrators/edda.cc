@@ -134,7 +134,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     // A piece is no longer than the sweeps converge in, and ends where a contact comes to rest or a resting one is hit.
     double done = 0, until_contact = kNever;
     double& longest = found_.longest;
-    bool looked = false;  // at the contacts at the start of the piece, which need be resolved once only
+    bool looked = false;  // at the contacts at the start of the piece, which must be resolved only once
     while (done < slab.length) {
       if (found_.touching && !looked) {
         looked = true;

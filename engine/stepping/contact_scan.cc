@@ -295,19 +295,18 @@ void ContactScan<D>::hold(Positions<D> v, Vectors<D> a, double time_left) {
 }
 
 /// The least acceleration, times the length of the normal, at which the spheres of a resting contact do not overlap
-/// within `time_left` under the accelerations a. A contact that opens, no faster than its holding
-/// speed, closes again.
+/// within `time_left` under the accelerations a. A contact that opens, no faster than its holding speed, closes again.
 template <int D>
 double ContactScan<D>::least_opening(const RestingContact<D>& contact, Positions<D> v, Positions<D> a,
                                      double time_left) const {
-  const auto& [key, normal] = std::tie(contact.key, contact.normal);
+  const EventKey<D>& key = contact.key;
   const auto closing = [&](double opening) { return time_left > 0 ? -2 * std::max(0.0, opening) / time_left : 0; };
   if (key.kind != EventKind::pair) {
     const Wall<D> wall = box_.wall(key.hi);
     return wall.acceleration + closing(wall.opening(v[key.lo], 0));
   }
   const Vec<D> u = v[key.lo] - v[key.hi];
-  return std::max(0.0, -u.dot(a[key.lo] - a[key.hi])) * time_left - u.squaredNorm() + closing(normal.dot(u));
+  return std::max(0.0, -u.dot(a[key.lo] - a[key.hi])) * time_left - u.squaredNorm() + closing(contact.normal.dot(u));
 }
 
 template <int D>

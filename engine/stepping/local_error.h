@@ -6,12 +6,11 @@
 // rate j, the position at the end is wrong by ∫∫ j (t − h/2) dt dt = j h³/12. The mean accelerations a and a⁻ of this
 // step and the one before belong to the middles of the steps, so j = 2 |a − a⁻|/(h + h⁻).
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <tuple>
-#include <utility>
 
 #include "engine/ranks/system.h"
 
@@ -24,9 +23,11 @@ struct LocalError {
   Id id = 0;             ///< the particle
   double strongest = 0;  ///< the largest acceleration by forces [length/time²]
   double of(double length) const { return rate * length * length * length; }
+  /// Keeps the larger error and the larger acceleration.
   void add(const LocalError& other) {
-    if (other.rate > rate) std::tie(rate, id) = std::pair(other.rate, other.id);
-    strongest = std::max(strongest, other.strongest);
+    const double most = std::max(strongest, other.strongest);
+    if (other.rate > rate) *this = other;
+    strongest = most;
   }
 };
 

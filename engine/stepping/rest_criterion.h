@@ -9,8 +9,8 @@
 //                       closed or a partner touches another sphere
 //   touching  held      Next::stops, −stopping ≤ u < −resting: a reaction stops     ½ m u² dissipated; without a
 //                       the approach                                                law returned (edda, cdda)
-//   touching  held      Next::rests, −resting ≤ u ≤ holding: so does a reaction,    as above, at the end of the piece
-//                       or the contact closes again at the end of the piece
+//   touching  held      Next::rests, −resting ≤ u ≤ holding: the contact closes     as above, at the end of the piece
+//                       again by the end of the piece
 //   touching  free      Next::parts, u > holding                                    none
 //   held      held      the reaction that keeps it from approaching is positive     its work: of a wall, or folded
 //   held      free      that reaction is zero                                       none

@@ -71,7 +71,6 @@ class ReactionSolver<D>::Problem {
   void begin(std::span<RestingContact<D>> contacts, std::span<Vec<D>> w) {
     contacts_ = contacts;
     w_ = w;
-    for (Body& body : bodies_) body.shift.setZero();
     for (int k = 0; k < size(); ++k) {
       const double of_hi = arms_[k].hi == kWall ? 0.0 : bodies_[arms_[k].hi].inverse_mass;
       const double inverse_mass = bodies_[arms_[k].lo].inverse_mass + of_hi;
@@ -168,9 +167,9 @@ class ReactionSolver<D>::Problem {
   struct Cluster {
     std::vector<int> contacts;           // ascending
     Eigen::SparseMatrix<double> all{};   // the lower half of its scaled matrix
-    std::vector<char> factored{};        // the contacts whose factors `factors` holds,
-    Eigen::VectorXd added{};             // and what was added to their diagonal
     std::unique_ptr<Factors> factors{};  // null: the order of elimination is not known
+    std::vector<char> factored{};        // by contact: whether it is in the matrix of `factors`
+    Eigen::VectorXd added{};             // to the diagonal of this matrix
   };
 
   std::vector<int> everything() const {
@@ -282,7 +281,7 @@ class ReactionSolver<D>::Problem {
       const Eigen::VectorXd more = which.factors->solve(off);
       for (int k = 0; k < m; ++k) {
         reaction[k] += more[k] / arms_[cluster[k]].scale;
-        if (!tied_ && !(reaction[k] >= 0)) return false;
+        if (!(reaction[k] >= 0)) return false;
         contacts_[cluster[k]].lambda = reaction[k];
       }
       if (std::exchange(solved, settled(cluster)) && solved) return true;
