@@ -12,16 +12,6 @@
 
 namespace carom {
 
-/// The reach of a sphere: half the largest distance at which two such spheres can have an event. For two different
-/// spheres this distance is the sum of their reaches. The widths of lists, cells, halos and windows follow from the
-/// reach; the radius of the hard core is used only where a contact is computed.
-inline double reach_of(double radius) { return radius; }
-/// The reach for each of these radii.
-inline std::vector<double> reaches_of(std::vector<double> radii) {
-  for (double& each : radii) each = reach_of(each);
-  return radii;
-}
-
 struct Sizes {
   std::size_t spheres = 0;           ///< total number of spheres
   bool by_species = false;           ///< indexed by species, else by id
@@ -61,7 +51,6 @@ struct Sizes {
     return mass_of(r.id, r.species);
   }
   double largest_radius() const { return *std::ranges::max_element(radius); }
-  double largest_reach() const { return reach_of(largest_radius()); }
 };
 
 }  // namespace carom

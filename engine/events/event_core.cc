@@ -89,7 +89,7 @@ bool EventCore<D>::admit(const Record<D>& r, const Internal<D>& internal, double
   const double radius = sizes_->radius_of(r);
   flights_.admit(slot, r, radius, sizes_->mass_of(r), internal);
   queue_.admit(slot);
-  search_.admit(slot, reach_of(radius), now);
+  search_.admit(slot, box_.steps.reach()(radius), now);
   queue_.read_versions();
   return true;
 }
@@ -190,8 +190,7 @@ void EventCore<D>::collide_pair(Slot i, Slot j, std::uint32_t partner, double ti
   const EventResult<D> result = flights_.collide(i, j, shift, time, generation);
   ++queue_[i].version;
   ++queue_[j].version;
-  if (report.trace)
-    return report.trace->end(flights_[i], flights_[j], {EventKind::pair, result.exchange}, result.overlap);
+  if (report.trace) return report.trace->end(flights_[i], flights_[j], result.exchange, result.overlap);
   report.counters.add_pair(result.exchange);
   const auto key = [&] {
     return pair_key<D>(time, generation, flights_[i].id, flights_[j].id, packing.image(partner));
@@ -209,7 +208,7 @@ void EventCore<D>::meet_alone(Slot i, std::uint32_t generation, const Report& re
   }
   const EventResult<D> result = flights_.meet_alone(key, i);
   ++queue_[i].version;
-  if (report.trace) return report.trace->end(flights_[i], flights_[i], {key.kind, result.exchange}, result.overlap);
+  if (report.trace) return report.trace->end(flights_[i], flights_[i], result.exchange, result.overlap);
   report.counters.add(key.kind, key.hi, result.exchange);
   report.counters.note_overlap(result.overlap, [&] { return Overlap(result.overlap, result.sigma, key); });
   if (report.contacts) report.contacts->push_back(flights_.contact_of(key, flights_[i], result));

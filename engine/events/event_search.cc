@@ -42,7 +42,7 @@ void EventSearch<D>::choose(double now) {
   if (counts_.predictions == 0) tuning_ = SearchTuning(options_);
   Extent<D> extent = flights_.extent();
   if (sizes_) {
-    largest_ = sizes_->largest_reach();
+    largest_ = box_.steps.reach()(sizes_->largest_radius());
     extent.particles = sizes_->spheres;
   } else {
     largest_ = *std::max_element(radii.begin(), radii.end());
@@ -128,7 +128,7 @@ void EventSearch<D>::plan_two(Slot i, Slot j, double now) {
   const ScanTask task[2] = {listed(i), listed(j)};
   counts_.candidates += task[0].n + task[1].n;
   ScanResult first[2];
-  kernels_.scan_two[D - 2](setting_, task, first);
+  if (!flights_.has_steps()) kernels_.scan_two[D - 2](setting_, task, first);
   queue_[i].contact = queue_[j].contact = kNever;
   for (const int k : {0, 1}) {
     const Slot one = task[k].self;
@@ -144,7 +144,7 @@ void EventSearch<D>::plan_two(Slot i, Slot j, double now) {
 template <int D>
 void EventSearch<D>::scan(const ScanTask& task, bool latest) {
   counts_.candidates += task.n;
-  plan_first(task, kernels_.scan[D - 2](setting_, task, latest));
+  plan_first(task, flights_.has_steps() ? ScanResult{} : kernels_.scan[D - 2](setting_, task, latest));
 }
 
 /// Plans the first contact with the candidates, computed one by one.

@@ -76,6 +76,8 @@ class EventSearch {
   void scan(const ScanTask& task, bool latest);
   /// Plans the first contact with the candidates if it is earlier than the planned one.
   [[gnu::always_inline]] void plan_first(const ScanTask& task, const ScanResult& first) {
+    if (flights_.has_steps()) [[unlikely]]
+      return offer_all(task);  // the kernels know contacts of cores only
     const double planned = queue_[task.self].contact;
     if (first.time > planned || first.time == kNever) return;
     if (first.tied || first.time == planned || first.time == -kNever) [[unlikely]]

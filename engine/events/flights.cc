@@ -6,6 +6,7 @@
 
 #include "engine/base/error.h"
 #include "engine/events/meeting.h"
+#include "engine/events/step_event.h"
 
 namespace carom {
 namespace {
@@ -33,6 +34,7 @@ void Flights<D>::load(const Particles<D>& particles, const Vec<D>& g, double hor
   field_ = g != Vec<D>::Zero();
   growth_ = growth;
   has_internal_ = laws().need_internal();
+  has_steps_ = !box_.steps.empty() && growth_ == 0;
   horizon_ = horizon;
   common_radius_ = common(particles.radius);
   common_mass_ = common(particles.mass);
@@ -59,7 +61,7 @@ template <int D>
 std::vector<double> Flights<D>::reaches(double t) const {
   std::vector<double> all = radius_.empty() ? std::vector<double>{common_radius_} : radius_;
   for (double& r : all) r = grown(r, t);
-  return reaches_of(std::move(all));
+  return growth_ == 0 ? box_.steps.reach()(std::move(all)) : all;
 }
 
 template <int D>
@@ -94,6 +96,7 @@ void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, co
   field_ = g != Vec<D>::Zero();
   growth_ = 0;
   has_internal_ = laws().need_internal();
+  has_steps_ = !box_.steps.empty() && growth_ == 0;
   horizon_ = horizon;
   common_radius_ = common(sizes.radius);
   common_mass_ = common(sizes.mass);
@@ -136,6 +139,9 @@ double Flights<D>::pair_contact(Slot i, const Record<D>& a, Slot j, const Record
   }
   d += shift;
   const double radii = radius(i) + radius(j), sigma = grown(radii, now), rate = radii * growth_;
+  if (const PairSteps* const steps = steps_of(a, b)) [[unlikely]]
+    return now + next_step_time<D>(*steps, {d, v}, sigma, gap_tolerance_(sigma),
+                                   approach_slack(sigma, a.v.norm(), b.v.norm()));
   const bool apart = d.squaredNorm() > sigma * sigma;
   const double slack = apart ? 0 : approach_slack(sigma, a.v.norm(), b.v.norm() + rate);
   return now + contact_time<D>(d, v, sigma, rate, slack);
@@ -196,8 +202,40 @@ EventResult<D> Flights<D>::collide_smooth(Slot i, Record<D>& a, Slot j, Record<D
 template <int D>
 EventResult<D> Flights<D>::collide(Slot i, Record<D>& a, Internal<D>& in_a, Slot j, Record<D>& b, Internal<D>& in_b,
                                    const Vec<D>& shift, double t, std::uint32_t generation) const {
-  if (!has_internal_) return collide_smooth(i, a, j, b, shift, t, generation);
-  return collide_with<true>(i, a, &in_a, j, b, &in_b, shift, t, generation);
+  const PairSteps* const steps = steps_of(a, b);
+  if (steps) [[unlikely]] {
+    advance(a, t);
+    advance(b, t);
+    const Vec<D> d = a.x - b.x + shift;
+    if (const StepSurface* const step = step_at(*steps, d.norm(), contact_distance(i, j)))
+      return meet_step(*step, i, a, j, b, d, generation);
+  }
+  EventResult<D> result = has_internal_ ? collide_with<true>(i, a, &in_a, j, b, &in_b, shift, t, generation)
+                                        : collide_smooth(i, a, j, b, shift, t, generation);
+  if (steps) [[unlikely]] {
+    result.sigma = steps->core_distance(result.sigma);
+    result.overlap = 1 - result.d.norm() / result.sigma;
+  }
+  return result;
+}
+
+template <int D>
+EventResult<D> Flights<D>::meet_step(const StepSurface& step, Slot i, Record<D>& a, Slot j, Record<D>& b,
+                                     const Vec<D>& d, std::uint32_t generation) const {
+  const Vec<D> v = a.v - b.v;
+  const double sigma = contact_distance(i, j), inverse_mass = 1 / mass(i) + 1 / mass(j);
+  const double e = tether_restitution<D>(laws(), d, v, a.species, b.species, inverse_mass);
+  const StepImpulse met = step_impulse<D>(step, d, v, inverse_mass, e);
+  const Vec<D> impulse = met.factor * d;
+  a.v += impulse / mass(i);
+  b.v -= impulse / mass(j);
+  a.generation = b.generation = static_cast<std::uint16_t>(generation);
+  const double range = step.distance(sigma);
+  return {d,
+          impulse,
+          {.virial = d.dot(impulse), .dissipated = met.dissipated, .stored = met.stored, .event = met.event},
+          step.tether() ? d.norm() / range - 1 : 0,
+          range};
 }
 
 template <int D>

@@ -53,6 +53,8 @@ class Flights {
   const Packing<D>& packing() const { return packing_; }
   const Record<D>& operator[](Slot i) const { return records_[i]; }
   std::span<const Record<D>> records() const { return records_; }
+  /// Whether pairs have steps; spheres that grow have none.
+  bool has_steps() const { return has_steps_; }
   /// Whether spheres have an internal state (ContactLaws::need_internal()).
   bool has_internal() const { return has_internal_; }
   /// The internal state of a sphere; zero if spheres have none.
@@ -85,22 +87,30 @@ class Flights {
   static std::uint32_t generation_at(const Record<D>& r, double t) { return r.t == t ? r.generation + 1u : 0u; }
   std::uint32_t generation_at(Slot i, double t) const { return generation_at(records_[i], t); }
 
-  /// The time at which two spheres next touch, with `shift` added to x_i − x_j; infinite if never. Exchanging the two
-  /// gives the same bits, because every difference only changes its sign.
+  /// The time at which two spheres next touch or reach a step, with `shift` added to x_i − x_j; infinite if never.
+  /// Exchanging the two gives the same bits, because every difference only changes its sign.
   double pair_contact(Slot i, Slot j, const Vec<D>& shift) const {
     return pair_contact(i, records_[i], j, records_[j], shift);
   }
 
-  /// Executes the collision of two spheres at time t.
+  /// Executes the event of two spheres at time t: a collision of their cores, or an event at a step.
   EventResult<D> collide(Slot i, Slot j, const Vec<D>& shift, double t, std::uint32_t generation) {
     if (has_internal_) [[unlikely]]
       return collide(i, records_[i], internal_[i], j, records_[j], internal_[j], shift, t, generation);
+    if (has_steps_) [[unlikely]] {
+      Internal<D> none[2];
+      return collide(i, records_[i], none[0], j, records_[j], none[1], shift, t, generation);
+    }
     return collide_smooth(i, records_[i], j, records_[j], shift, t, generation);
   }
 
   // The functions above for records other than the present ones. Internal states change; they are not read if spheres
   // have none.
   double pair_contact(Slot i, const Record<D>& a, Slot j, const Record<D>& b, const Vec<D>& shift) const;
+  /// The steps of two spheres; null: they have none.
+  const PairSteps* steps_of(const Record<D>& a, const Record<D>& b) const {
+    return has_steps_ ? box_.steps.find(a.id, a.species, b.id, b.species) : nullptr;
+  }
   EventResult<D> collide(Slot i, Record<D>& a, Internal<D>& in_a, Slot j, Record<D>& b, Internal<D>& in_b,
                          const Vec<D>& shift, double t, std::uint32_t generation) const;
 
@@ -144,6 +154,8 @@ class Flights {
                               const Vec<D>& shift, double t, std::uint32_t generation) const;
   EventResult<D> collide_smooth(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
                                 std::uint32_t generation) const;
+  [[gnu::noinline]] EventResult<D> meet_step(const StepSurface& step, Slot i, Record<D>& a, Slot j, Record<D>& b,
+                                             const Vec<D>& d, std::uint32_t generation) const;
   void set_surroundings();
   /// The time at which a sphere touches a wall. Throws Error(Failure::numerical) if it rests there under the field.
   double wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall) const;
@@ -168,7 +180,7 @@ class Flights {
   ContactLaws elastic_;
   std::vector<Wall<D>> walls_;
   Vec<D> g_ = Vec<D>::Zero();
-  bool field_ = false, has_internal_ = false, kicks_ = false, lone_events_ = false;
+  bool field_ = false, has_internal_ = false, has_steps_ = false, kicks_ = false, lone_events_ = false;
   double growth_ = 0, horizon_ = 0;
   GapTolerance gap_tolerance_;
   PageVector<Record<D>> records_;  // by slot

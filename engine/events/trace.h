@@ -54,6 +54,7 @@ class Trace {
     PackedExchange exchange;
     std::uint16_t generation;
     EventKind kind;
+    PairEvent pair_event;   ///< Exchange::event
     std::uint32_t partner;  ///< the partner of the first sphere, as in NextEvent
     Slot slot[2];           ///< the second one is kNoEntry in a lone event
     std::uint32_t last[2];  ///< the sphere's entry in its previous event, or kNoEntry
@@ -93,10 +94,11 @@ class Trace {
     internal_before_.insert(internal_before_.end(), {a, b});
   }
   /// Call after the event.
-  void end(const Record<D>& a, const Record<D>& b, const PackedExchange& exchange, double overlap) {
+  void end(const Record<D>& a, const Record<D>& b, const Exchange& exchange, double overlap) {
     Event& event = events_[size_ - 1];
     event.time = a.t;
-    event.exchange = exchange;
+    event.exchange = {event.kind, exchange};
+    event.pair_event = exchange.event;
     event.overlap = overlap;
     fastest_squared_ = std::max({fastest_squared_, a.v.squaredNorm(), b.v.squaredNorm()});
   }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/laws/counters.h"
+#include "engine/ranks/step_account.h"
 #include "engine/ranks/system.h"
 
 namespace carom {
@@ -169,6 +170,7 @@ struct MotionSums {
   std::array<ExactSum, D> momentum;  ///< m v [mass·length/time]
   double fastest = 0;                ///< largest |v| [length/time]
   double farthest = 0;               ///< largest coordinate [length]
+  StepAccount steps{};               ///< the steps of pairs
 
   void add(const MotionSums& other) {
     kinetic.add(other.kinetic);
@@ -177,6 +179,7 @@ struct MotionSums {
     for (int k = 0; k < D; ++k) momentum[k].add(other.momentum[k]);
     fastest = std::max(fastest, other.fastest);
     farthest = std::max(farthest, other.farthest);
+    steps.add(other.steps);
   }
 };
 
@@ -195,7 +198,7 @@ MotionSums<D> own_motion(const System<D>& system, const Particles<D>& state, con
     farthest = std::max(farthest, at.x[i].cwiseAbs().maxCoeff());
     for (int k = 0; k < D; ++k) momentum[k].add(moving_mass(state.mass[i]) * state.v[i][k]);
   }
-  MotionSums<D> sums{kinetic.sum(), {}, speed.sum(), {}, std::sqrt(fastest), farthest};
+  MotionSums<D> sums{kinetic.sum(), {}, speed.sum(), {}, std::sqrt(fastest), farthest, own_steps(system, at)};
   if (system.box.contacts.rough()) {
     ExactSeries rotational;
     for (Id i = 0; i < at.size(); ++i)

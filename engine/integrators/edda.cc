@@ -93,7 +93,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     counters_ = &report.counters;
     report_ = &report;
-    const std::uint64_t counted = report.counters.sphere_sphere + report.counters.sphere_wall;
+    const std::uint64_t counted = report.counters.contacts();
     if (slab.index != step_) counted_ = counted;
     most_contacts_ = slab.most_contacts;
     step_ = slab.index;
@@ -504,6 +504,7 @@ IntegratorInfo edda() {
           "6 (1996) 449; Gonzalez, Schmidt, Ortiz, Int. J. Numer. Methods Eng. 82 (2010) 205 and 84 (2010) 1407",
       .exact = true,
       .local = true,
+      .steps = true,
       .adapts = true,
       .most_contacts = kMostContacts,
       .in_2d = make<EventDrivenDiscreteGradient, 2>,

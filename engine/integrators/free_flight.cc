@@ -142,6 +142,7 @@ IntegratorInfo free_flight() {
           .stepping = false,
           .smooth_forces = false,
           .exact = true,
+          .steps = true,
           .in_2d = make<FreeFlight, 2>,
           .in_3d = make<FreeFlight, 3>};
 }

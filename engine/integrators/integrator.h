@@ -88,6 +88,7 @@ struct IntegratorInfo {
   bool exact = false;         ///< conserves energy to rounding at any step: a jump ends the run
   bool local = false;         ///< each rank needs only its own particles and nearby ones; false: all particles
   bool shadow = false;        ///< a Verlet type: report the shadow energy S_h
+  bool steps = false;         ///< pairs may have steps (laws/steps.h)
   bool adapts = false;        ///< steps may have any lengths: SlabReport::error and StepTooLong choose them
   /// Contacts of a sphere in a slab above which shorter slabs are cheaper; infinite: slabs may have any number.
   double most_contacts = std::numeric_limits<double>::infinity();
@@ -98,6 +99,8 @@ struct IntegratorInfo {
   /// some particles are fixed.
   template <int D>
   std::string refusal(const Interaction<D>& term, bool fixed) const;
+  /// As above, for these steps.
+  std::string refusal(const Steps& steps) const;
 
   template <int D>
   std::unique_ptr<Integrator<D>> make(const Parameters& p) const {

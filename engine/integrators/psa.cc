@@ -130,6 +130,7 @@ IntegratorInfo psa() {
           .source = "Suh, Mier-y-Teran, White, Davis, Chem. Phys. 142 (1990) 203",
           .local = true,
           .shadow = true,
+          .steps = true,
           .in_2d = make<PrimitiveSplitting, 2>,
           .in_3d = make<PrimitiveSplitting, 3>};
 }

@@ -26,6 +26,14 @@ std::string IntegratorInfo::refusal(const Interaction<D>& term, bool fixed) cons
          "field "
          "out, let all particles move, or take psa, edda or their relatives";
 }
+std::string IntegratorInfo::refusal(const Steps& given) const {
+  if (given.empty() || steps) return "";
+  std::string able;
+  for (const IntegratorInfo& each : integrators())
+    if (each.steps) able.append(able.empty() ? "" : ", ").append(each.name);
+  return std::string("'").append(name).append("' does not know steps of the pair energy; take one of: ").append(able);
+}
+
 template std::string IntegratorInfo::refusal(const Interaction<2>&, bool) const;
 template std::string IntegratorInfo::refusal(const Interaction<3>&, bool) const;
 

@@ -15,6 +15,7 @@
 #include "engine/laws/bath.h"
 #include "engine/laws/boundary.h"
 #include "engine/laws/contact_law.h"
+#include "engine/laws/steps.h"
 #include "engine/laws/wall.h"
 
 namespace carom {
@@ -60,6 +61,7 @@ struct Box {
   double step_start = 0, step = 0;  ///< the step of a stepping method; step = 0: shaken walls move on a sine
   bool straight = false;            ///< shaken walls move straight over each step
   ContactLaws contacts{};
+  Steps steps{};
 
   bool periodic(int axis) const { return boundary[axis] == Boundary::periodic; }
   bool walled(int axis) const { return boundary[axis] == Boundary::wall; }

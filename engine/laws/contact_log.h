@@ -45,27 +45,36 @@ std::string partners(const EventKey<D>& key, const Box<D>& box) {
   return "particle " + lo + " and " + (key.kind == EventKind::kick ? "the bath" : box.wall_name(key.hi));
 }
 
-/// The energies of a contact: the kinetic energy changes by work + heat − dissipated.
+/// What happens to two spheres: a collision of their cores, or an event at a step (steps.h).
+enum class PairEvent : std::uint8_t { core = 0, enter = 1, leave = 2, bounce = 3 };
+
+/// The energies of a contact: the kinetic energy changes by work + heat − dissipated − stored.
 struct Exchange {
-  double virial = 0;      ///< of a pair: (x_lo − x_hi)·impulse as computed [energy]
-  double impulse = 0;     ///< of a wall: on the sphere, along the wall's normal [mass·length/time]
-  double work = 0;        ///< that a moving wall does on the sphere [energy]
-  double heat = 0;        ///< that the sphere gets from a thermal wall or a bath [energy]
-  double dissipated = 0;  ///< energy lost [energy]
+  double virial = 0;                  ///< of a pair: (x_lo − x_hi)·impulse as computed [energy]
+  double impulse = 0;                 ///< of a wall: on the sphere, along the wall's normal [mass·length/time]
+  double work = 0;                    ///< that a moving wall does on the sphere [energy]
+  double heat = 0;                    ///< that the sphere gets from a thermal wall or a bath [energy]
+  double dissipated = 0;              ///< energy lost [energy]
+  double stored = 0;                  ///< energy that a step takes from the motion [energy]
+  PairEvent event = PairEvent::core;  ///< of a pair
 };
 
-/// An exchange in two numbers, for logs of many contacts.
+/// An exchange in two numbers, for logs of many contacts; `event` is kept beside them.
 struct PackedExchange {
   double first = 0;  ///< the virial of a pair, the impulse of a wall
-  double lost = 0;   ///< what is dissipated; of a thermal wall or a bath the heat, negated
+  double lost = 0;   ///< what is dissipated; where a pair enters or leaves, what is stored; of a thermal wall or a bath
+                     ///< the heat, negated
 
   PackedExchange() = default;
   PackedExchange(EventKind kind, const Exchange& all)
-      : first(kind == EventKind::pair ? all.virial : all.impulse), lost(all.dissipated - all.heat) {}
+      : first(kind == EventKind::pair ? all.virial : all.impulse), lost(all.dissipated + all.stored - all.heat) {}
   /// `number`: that of the wall, if it is one.
   template <int D>
-  Exchange unpacked(EventKind kind, Id number, const Box<D>& box, double time) const {
-    if (kind == EventKind::pair) return {.virial = first, .dissipated = lost};
+  Exchange unpacked(EventKind kind, PairEvent event, Id number, const Box<D>& box, double time) const {
+    if (kind == EventKind::pair) {
+      const bool crosses = event == PairEvent::enter || event == PairEvent::leave;
+      return {.virial = first, .dissipated = crosses ? 0 : lost, .stored = crosses ? lost : 0, .event = event};
+    }
     if (kind == EventKind::kick) return {.heat = -lost};
     const Wall<D> wall = box.wall(number);
     Exchange all{.impulse = first, .work = wall.velocity_at(time) * first};

@@ -34,6 +34,24 @@ struct WallTally {
   }
 };
 
+/// Events of pairs at steps, and the energy that they took from the motion.
+struct StepTally {
+  std::uint64_t entered = 0, left = 0, bounced = 0;
+  ExactSum stored;  ///< [energy]
+
+  std::uint64_t events() const { return entered + left + bounced; }
+  void add(const Exchange& exchange) {
+    ++(exchange.event == PairEvent::enter ? entered : exchange.event == PairEvent::leave ? left : bounced);
+    stored.add(exchange.stored);
+  }
+  void add(const StepTally& other) {
+    entered += other.entered;
+    left += other.left;
+    bounced += other.bounced;
+    stored.add(other.stored);
+  }
+};
+
 /// Depth relative to the contact distance up to which an overlap is taken for rounding. Contacts touch within the gap
 /// tolerance (wall.h), 1e-13 of the contact distance, and the methods leave up to ten times as much; this is a hundred
 /// times. Where 4 ulp of the box are the larger tolerance, see kRoundingOfPositions (engine/run/monitor.cc).
@@ -99,12 +117,13 @@ struct ContactTally : OverlapTally {
   ExactSum dissipated;              ///< energy lost at contacts [energy]
   ExactSum work;                    ///< work done on spheres by moving walls [energy]
   ExactSum heat;                    ///< energy that spheres got from walls and baths with a temperature [energy]
+  StepTally steps;                  ///< events of pairs at steps
   std::vector<WallTally> walls;     ///< by number, as far as walls were hit
 
   /// What kinetic and potential energy have lost to the surroundings: H + drained() is conserved.
   double drained() const { return dissipated.value() - work.value() - heat.value(); }
 
-  std::uint64_t contacts() const { return sphere_sphere + sphere_wall; }
+  std::uint64_t contacts() const { return sphere_sphere + steps.events() + sphere_wall; }
   /// The sums of a wall.
   WallTally& wall(Id number) {
     if (walls.size() <= number) walls.resize(number + 1);
@@ -118,7 +137,10 @@ struct ContactTally : OverlapTally {
     heat.add(exchange.heat);
   }
   void add_pair(const Exchange& exchange) {
-    ++sphere_sphere;
+    if (exchange.event == PairEvent::core)
+      ++sphere_sphere;
+    else
+      steps.add(exchange);
     collision_virial.add(exchange.virial);
     if (exchange.dissipated != 0) dissipated.add(exchange.dissipated);
   }
@@ -138,10 +160,11 @@ struct ContactTally : OverlapTally {
     dissipated.add(other.dissipated);
     work.add(other.work);
     heat.add(other.heat);
+    steps.add(other.steps);
     for (std::size_t number = other.walls.size(); number-- > 0;) wall(static_cast<Id>(number)).add(other.walls[number]);
   }
   void archive(Archive& archive) {
-    archive(sphere_sphere, sphere_wall, kicks, max_overlap, worst, collision_virial, dissipated, work, heat, walls);
+    archive(sphere_sphere, sphere_wall, kicks, max_overlap, worst, collision_virial, dissipated, work, heat, steps, walls);
   }
   /// Counts a contact and appends it to `log` unless `log` is null.
   template <int D>

@@ -208,7 +208,7 @@ bool Decomposition<D>::migrate_to_near(double slab_length) {
   }
   work.resize(own.size());
   ranks_->largest(most);
-  width_.fit(reach, speed * slab_length, 2 * sizes_->largest_reach());
+  width_.fit(reach, speed * slab_length, 2 * system_.box.steps.reach()(sizes_->largest_radius()));
   if (!std::isfinite(width_.far())) return false;
   const Bisection<D> bisection(system_.box, own, blocks().ranks, width_.far(), *ranks_, work);
   std::vector<std::uint64_t> known(blocks().ranks);

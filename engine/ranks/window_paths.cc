@@ -128,7 +128,8 @@ ContactTally WindowPaths<D>::tally() const {
     const Slot lo = event.slot[0], hi = event.slot[1];  // clang 14 cannot capture a structured binding
     if (!ownership_.owns(lo) || paths_.has(lo)) continue;
     const bool pair = event.kind == EventKind::pair;
-    tally.add(event.kind, event.partner, event.exchange.unpacked(event.kind, event.partner, box_, event.time));
+    tally.add(event.kind, event.partner,
+              event.exchange.unpacked(event.kind, event.pair_event, event.partner, box_, event.time));
     tally.note_overlap(event.overlap, [&] {
       return Overlap(event.overlap, pair ? flights_.contact_distance(lo, hi) : flights_.radius(lo), key_of(2 * n));
     });

@@ -25,7 +25,7 @@ WindowedFlight<D>::WindowedFlight(const Box<D>& box, Sizes sizes, Communicator& 
       ranks_(ranks),
       subdomains_(std::clamp<std::size_t>(sizes_.spheres / kMinSpheres, 1, static_cast<std::size_t>(ranks_.size()))),
       subdomain_(box, sizes_, options, ranks),
-      length_(2 * sizes_.largest_reach(), std::move(window)) {}
+      length_(2 * box.steps.reach()(sizes_.largest_radius()), std::move(window)) {}
 
 template <int D>
 void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double horizon) {
@@ -34,8 +34,8 @@ void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double ho
   events_ = 0;
   length_.start(box_, sizes_, ranks_, particles, g, horizon);
   const auto divide = [&](std::size_t subdomains) {
-    bisection_.emplace(box_, particles.x, subdomains, 2 * (sizes_.largest_reach() + length_.max_displacement()), ranks_,
-                       work_);
+    bisection_.emplace(box_, particles.x, subdomains,
+                       2 * (box_.steps.reach()(sizes_.largest_radius()) + length_.max_displacement()), ranks_, work_);
     for (std::uint32_t r = 0; r < subdomains; ++r)
       if (bisection_->neighbours(r).size() > kMaxNeighbours) return false;
     return true;

@@ -32,11 +32,14 @@ Measurement<D> measured(const System<D>& system, const MotionSums<D>& motion, co
                         const Tail& tail) {
   const double kinetic = motion.kinetic.value(), rotational = motion.rotational.value();
   Measurement<D> found;
-  found.magnitude = kinetic + rotational + sums.magnitude.value();
+  const double of_steps = motion.steps.energy.value();
+  found.magnitude = kinetic + rotational + sums.magnitude.value() + std::abs(of_steps);
   found.virial = 2 * kinetic + sums.virial.value() + tail.virial;
   found.shot.kinetic = kinetic + rotational;
   found.shot.rotational = rotational;
-  found.shot.potential = sums.energy.value() + tail.energy;
+  found.shot.potential = sums.energy.value() + of_steps + tail.energy;
+  found.shot.step_energy = of_steps;
+  found.shot.bonds = static_cast<double>(motion.steps.inside) / static_cast<double>(system.size());
   for (int k = 0; k < D; ++k) found.shot.momentum[k] = motion.momentum[k].value();
   if (const auto total = static_cast<double>(system.moving()); total > 0) {
     found.shot.temperature = 2 * kinetic / (D * total);

@@ -83,6 +83,9 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
                          archive(static_cast<SpinReadings&>(shot_));
                          statistics_.rotational_energy = shot_.rotational;
                        }});
+  if (!system.box.steps.empty())
+    fields.add_of_run(
+        {"steps", [this](Archive& archive) { archive(first_step_energy_, static_cast<StepReadings&>(shot_)); }});
   fields.add_value("next frame", frames_.next());
   fields.add_value("next row", rows_.next());
   for (std::size_t k = 0; k < samplers_.size(); ++k) {
@@ -113,6 +116,7 @@ void Monitor<D>::start(const Integrator<D>& integrator, bool fresh) {
   statistics_.energy_initial = statistics_.energy_final = shot_.total();
   if (system_.box.contacts.rough()) statistics_.rotational_energy = shot_.rotational;
   account_.first_momentum = shot_.momentum;
+  first_step_energy_ = shot_.step_energy - statistics_.counters.steps.stored.value();
   count_from(shot_);
   statistics_.first_step_error = 0;
   sample(time, system_.particles);
@@ -147,6 +151,27 @@ void Monitor<D>::guard(double energy_before, double magnitude_before) {
   if (info_.exact && jump > kLargestEnergyJump * std::max({s.energy_reference, magnitude_before, account_.magnitude}))
     fail("the energy, which " + std::string(info_.name) + " keeps to rounding, jumped by " + short_text(jump) + " to " +
          short_text(account_.energy));
+}
+
+/// Throws if the energy of the steps by positions is not the one that events have stored, so that a pair has changed
+/// sides unseen (step_event.h), or if a tether has lost a pair.
+template <int D>
+void Monitor<D>::check_steps(const Waiting& slab, const StepAccount& counted) {
+  const Steps& steps = system_.box.steps;
+  if (steps.empty()) return;
+  const double by_events = first_step_energy_ + slab.tally.steps.stored.value(), by_positions = counted.energy.value();
+  const std::string when =
+      " between the times " + short_text(slab.time - slab.elapsed, 10) + " and " + short_text(slab.time, 10);
+  constexpr double kRounding = 1e-6;  // of the sums, relative to the smallest jump of an energy
+  if (std::abs(by_positions - by_events) > kRounding * steps.least_climb())
+    throw Error(Failure::numerical,
+                "a pair has changed the side of a step unseen" + when + ": the energy of all steps is " +
+                    short_text(by_positions, 12) + " by positions and " + short_text(by_events, 12) +
+                    " by events; another sphere has turned the pair within rounding of the step, which is rare: "
+                    "continue from the last checkpoint with another integrator.step, or start with another seed");
+  if (counted.tethered != steps.tethers())
+    throw Error(Failure::numerical, std::to_string(steps.tethers() - counted.tethered) +
+                                        " tethers have lost their pairs" + when + "; use a smaller integrator.step");
 }
 
 /// Names the fastest particle, for messages. Collective.
@@ -297,6 +322,7 @@ void Monitor<D>::take(const Waiting& slab, const Sums& sums) {
     s.max_shadow_energy_error =
         std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow + slab.tally.drained() - account_.first_shadow));
   guard(energy, magnitude);
+  check_steps(slab, sums.motion.steps);
   if (s.max_momentum_error)
     s.max_momentum_error = std::max(*s.max_momentum_error,
                                     (Vec<D>(shot_.momentum.data()) - Vec<D>(account_.first_momentum.data())).norm());
@@ -358,7 +384,8 @@ Snapshot<D> Monitor<D>::measured(const Waiting& at, const Sums& sums) {
   shot.heat = at.tally.heat.value();
   shot.step_length = statistics_.step_length;
   // The conserved quantity: the energy of the spheres, what they have lost, and less what walls and baths gave them.
-  account_.energy = shot.kinetic + sums.potential.energy.value() + (shot.dissipated - shot.work - shot.heat);
+  account_.energy =
+      shot.kinetic + (sums.potential.energy.value() + shot.step_energy) + (shot.dissipated - shot.work - shot.heat);
   account_.magnitude = found.magnitude;
   account_.virial = found.virial;
   account_.speed = found.speed;
@@ -426,7 +453,8 @@ OverlapTally Monitor<D>::overlaps(double time) {
   OverlapTally found;
   const auto look = [&](NeighbourList<D>& list, const Particles<D>& p) {
     for (const auto& pair : list.cover(p.x)) {
-      const double sigma = p.radius[pair.i] + p.radius[pair.j];
+      const double sigma =
+          system_.box.steps.core_distance(p.id_of(pair.i), p.id_of(pair.j), p.radius[pair.i] + p.radius[pair.j]);
       const double squared = (p.x[pair.i] - p.x[pair.j] + system_.box.shift(pair.image)).squaredNorm();
       if (squared >= sigma * sigma) continue;
       const double depth = 1 - std::sqrt(squared) / sigma;

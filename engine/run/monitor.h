@@ -128,6 +128,7 @@ class Monitor {
   void add_to_series(const Waiting& slab, double path);
   void note_overlap(const Waiting& slab, const Sums& sums);
   void guard(double energy_before, double magnitude_before);
+  void check_steps(const Waiting& slab, const StepAccount& counted);
   std::string fastest(const Particles<D>& state) const;
   OverlapTally overlaps(double time);
   const Particles<D>& all_particles(const Particles<D>& state);
@@ -158,6 +159,7 @@ class Monitor {
     std::uint64_t sampled_collisions = 0;
     std::array<double, D> first_momentum{};
   } account_;
+  double first_step_energy_ = 0;  // at the start of the run
   Transient transient_;
   std::optional<double> transient_end_;
   std::vector<Sampled> sampled_walls_;        // impulses of the walls, by number

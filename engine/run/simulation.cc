@@ -36,12 +36,13 @@ double largest_radius(const System<D>& system) {
 
 template <int D>
 void check_spheres(const System<D>& system) {
-  const double diameter = 2 * reach_of(largest_radius(system));
+  const double diameter = 2 * largest_radius(system);
   for (int k = 0; k < D; ++k)
     if (system.box.periodic(k) && system.box.edges[k] < diameter)
       throw Error(Failure::initial_state, "the periodic box is " + short_text(system.box.edges[k]) + " long on axis " +
                                               std::to_string(k) + ", less than a diameter of " + short_text(diameter) +
                                               "; enlarge it, a sphere must not touch itself");
+  if (const std::string problem = step_problem(system); !problem.empty()) throw Error(Failure::initial_state, problem);
   if (const Outsiders out = find_outsiders(system); out.spheres > 0)
     throw Error(Failure::initial_state, "particle " + std::to_string(out.worst) + " reaches " + short_text(out.depth) +
                                             " beyond " + system.box.wall_name(out.wall) +
@@ -81,9 +82,10 @@ void check_rest_speeds(const System<D>& system) {
                                      short_text(thermal) + "; give a smaller one, or none");
 }
 
-/// Throws if the method refuses a force; fixed particles matter from count_moving() on.
+/// Throws if the method refuses steps or a force; fixed particles matter from count_moving() on.
 template <int D>
 void check_forces(const System<D>& system, const IntegratorInfo& info) {
+  if (const std::string no = info.refusal(system.box.steps); !no.empty()) throw Error(Failure::deck, no);
   for (const auto& term : system.interactions)
     if (const std::string no = info.refusal(*term, system.has_fixed()); !no.empty()) throw Error(Failure::deck, no);
 }

@@ -95,9 +95,15 @@ struct SpinReadings {
   double rotational_temperature = 0;  ///< Σ I ω²/(f N), f = 1 in two dimensions, 3 in three [energy]
 };
 
+/// The numbers of a Snapshot that runs with steps store in addition.
+struct StepReadings {
+  double step_energy = 0;  ///< the part of V that is in steps [energy]
+  double bonds = 0;        ///< pairs inside the outermost of their steps, for each particle
+};
+
 /// What an observer gets: a state and its observables, all at `time`.
 template <int D>
-struct Snapshot : Readings<D>, SpinReadings {
+struct Snapshot : Readings<D>, SpinReadings, StepReadings {
   const Particles<D>* particles = nullptr;  ///< all particles; with several ranks this rank's block (with ids)
   double max_energy_error = 0;              ///< as in Statistics, so far [energy]
   double pressure = 0;  ///< virial: (Σ m v² + Σ d·F + Σ d·impulse/Δt)/(D V), collisions since the last thermo row

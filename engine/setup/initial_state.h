@@ -16,4 +16,9 @@ Overlaps find_overlaps(const System<D>& system);
 template <int D>
 Outsiders find_outsiders(const System<D>& system);
 
+/// Why the steps of pairs do not fit radii, box or positions, as "what is wrong; what to do"; empty if they do.
+/// Collective.
+template <int D>
+std::string step_problem(const System<D>& system);
+
 }  // namespace carom

@@ -196,14 +196,16 @@ std::size_t insert_at_random(const Box<D>& box, std::span<Vec<D>> x, std::span<c
 
 template <int D>
 Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius,
-                       std::span<const char> beyond, std::span<const char> fixed) {
+                       std::span<const char> beyond, std::span<const char> fixed, std::span<const Id> id) {
   Overlaps found;
   SizedCells<D> cells(box, radius, Extent<D>(x));
   const GapTolerance tolerance = box.gap_tolerance();
   for (Id i = 0; i < x.size(); ++i) {
     const auto look = [&](Id j, const Image<D>& image) {
       if (!fixed.empty() && fixed[i] != 0 && fixed[j] != 0) return;
-      const double distance = (x[i] - x[j] + box.shift(image)).norm(), contact = radius[i] + radius[j];
+      const double distance = (x[i] - x[j] + box.shift(image)).norm(),
+                   contact =
+                       box.steps.core_distance(id.empty() ? i : id[i], id.empty() ? j : id[j], radius[i] + radius[j]);
       if (distance < contact - tolerance(contact)) found.add({1, j, i, distance, contact});
     };
     if (beyond.empty() || beyond[i] == 0) cells.for_each_near(x[i], radius[i], look);
@@ -307,7 +309,7 @@ template Vec<2> commensurate_edges<2>(Lattice, std::size_t, double);
 template std::size_t insert_at_random(const Box<2>&, std::span<Vec<2>>, std::span<const double>, std::span<const Id>,
                                       std::uint64_t, const Pause&, std::uint64_t);
 template Overlaps find_overlaps(const Box<2>&, std::span<const Vec<2>>, std::span<const double>, std::span<const char>,
-                                std::span<const char>);
+                                std::span<const char>, std::span<const Id>);
 template Outsiders find_outsiders(const Box<2>&, std::span<const Vec<2>>, std::span<const double>,
                                   std::span<const char>);
 template void draw_velocities(Particles<2>&, std::span<const Id>, std::span<const double>, std::uint64_t, RandomPurpose,
@@ -324,7 +326,7 @@ template Vec<3> commensurate_edges<3>(Lattice, std::size_t, double);
 template std::size_t insert_at_random(const Box<3>&, std::span<Vec<3>>, std::span<const double>, std::span<const Id>,
                                       std::uint64_t, const Pause&, std::uint64_t);
 template Overlaps find_overlaps(const Box<3>&, std::span<const Vec<3>>, std::span<const double>, std::span<const char>,
-                                std::span<const char>);
+                                std::span<const char>, std::span<const Id>);
 template Outsiders find_outsiders(const Box<3>&, std::span<const Vec<3>>, std::span<const double>,
                                   std::span<const char>);
 template void draw_velocities(Particles<3>&, std::span<const Id>, std::span<const double>, std::uint64_t, RandomPurpose,

@@ -83,7 +83,8 @@ struct Overlaps {
 };
 template <int D>
 Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius,
-                       std::span<const char> beyond = {}, std::span<const char> fixed = {});
+                       std::span<const char> beyond = {}, std::span<const char> fixed = {},
+                       std::span<const Id> id = {});
 
 /// Spheres not marked in `fixed` that extend beyond a wall by more than the gap tolerance.
 struct Outsiders {

@@ -29,7 +29,7 @@ ContactScan<D>::ContactScan(const System<D>& system, std::uint64_t max_events, s
       walls_(system.box.walls()),
       walls_at_(system.box.time),
       tolerance_(system.box.gap_tolerance()),
-      list_(system.box, reaches_of(system.particles.radius), {}, system.particles.all_fixed()),
+      list_(system.box, system.box.steps.reach()(system.particles.radius), {}, system.particles.all_fixed()),
       keeps_momentum_(system.keeps_momentum()),
       max_events_(max_events),
       reactions_(reactions),

@@ -105,7 +105,15 @@ class ContactScan {
   /// The mean velocity of a wall along its normal over a piece that starts now.
   double mean_speed(Id wall, double length) const { return box_.wall(wall).velocity_at(0.5 * length); }
 
-  double contact_distance(Id i, Id j) const { return particles_.radius[i] + particles_.radius[j]; }
+  double contact_distance(Id i, Id j) const {
+    const double sigma = particles_.radius[i] + particles_.radius[j];
+    return box_.steps.empty() ? sigma : box_.steps.core_distance(particles_.id_of(i), particles_.id_of(j), sigma);
+  }
+  /// The steps of two particles; null: they have none.
+  const PairSteps* steps(Id i, Id j) const {
+    if (box_.steps.empty()) return nullptr;
+    return box_.steps.find(particles_.id_of(i), particles_.species[i], particles_.id_of(j), particles_.species[j]);
+  }
   double tolerance(double sigma) const { return tolerance_(sigma); }
   /// Whether spheres at separation d touch.
   bool touches(const Vec<D>& d, double sigma) const {

@@ -55,6 +55,7 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
   a_ = a;
   length_ = length;
   walls_ = box_.walls();
+  has_steps_ = !box_.steps.empty();
   resolved_ = resolved;
   last_sequences_.clear();
   sequences_.clear();
@@ -97,7 +98,9 @@ void SlabCore<D>::find_near() {
   near_.clear();
   for (std::uint32_t k = 0; k < pairs_.size(); ++k) {
     const auto& [i, j, image] = pairs_[k];
-    const double sigma = scan_->contact_distance(i, j), touching = sigma + scan_->tolerance(sigma);
+    const PairSteps* const steps = scan_->steps(i, j);
+    const double contact = scan_->contact_distance(i, j), sigma = steps ? steps->farthest(contact) : contact;
+    const double touching = sigma + scan_->tolerance(sigma);
     const double near = touching + longest_path_of_[i] + longest_path_of_[j];
     const Vec<D> d = x[i] - x[j] + box_.shift(image);
     if (!(d.squaredNorm() <= near * near)) continue;
@@ -222,11 +225,15 @@ FlightEnd<D> SlabCore<D>::serve() {
     const EventKey<D>& key = event.key;
     const bool pair = key.kind == EventKind::pair;
     if (event.version_lo != version(key.lo) || (pair && event.version_hi != version(key.hi))) continue;
-    if (resolved_ && !(key.time > 0)) continue;  // resolve() has handled these; what is found again is rounding
-    if (!box_.contacts.elastic() && at_the_end(key)) continue;
+    const StepSurface* const step = has_steps_ ? step_of(key) : nullptr;
+    // resolve() has handled contacts at the start; what is found again is rounding.
+    if (!step && resolved_ && !(key.time > 0)) continue;
+    if (!step && !box_.contacts.elastic() && at_the_end(key)) continue;
     const bool held = !held_.empty() && (held_[key.lo] != 0 || (pair && held_[key.hi] != 0));
     // A straight flight presses no spheres together: elastic contacts that do not approach need no impulse.
-    if (held || ((!a_.empty() || !box_.contacts.elastic()) && comes_to_rest(key))) {
+    if (step && held) {  // the piece ends right after the step
+      if (const double after = end_after(key); after < length_) return {.complete = false, .time = after, .key = key};
+    } else if (!step && (held || ((!a_.empty() || !box_.contacts.elastic()) && comes_to_rest(key)))) {
       if (falls_back(key)) {  // and with it others, so that the piece need not be tried again for each of them
         for (const Planned& other : queue_) falls_back(other.key);
         return {.complete = false, .key = key};
@@ -298,16 +305,45 @@ void SlabCore<D>::predict_pair(Id i, Id j, const Image<D>& image) {
   const double t = std::max(start(i), start(j)), sigma = scan_->contact_distance(i, j), time_left = length_ - t;
   const Vec<D> d = position(i, t) - position(j, t) + box_.shift(image);
   const Vec<D> v_i = velocity(i, t), v_j = velocity(j, t), v = v_i - v_j;
+  const PairSteps* const steps = has_steps_ ? scan_->steps(i, j) : nullptr;
   const bool touching = scan_->touches(d, sigma);
-  const double slack = touching ? sigma * (scan_->rounding_speed(i, v_i) + scan_->rounding_speed(j, v_j)) : 0.0;
-  const double s = a_.empty() ? contact_time<D>(d, v, sigma, slack)
-                              : contact_time<D>(d, v, a_[i] - a_[j], sigma, time_left, touching, slack);
+  const double slack =
+      touching || steps ? sigma * (scan_->rounding_speed(i, v_i) + scan_->rounding_speed(j, v_j)) : 0.0;
+  const double s = steps        ? step_time({d, v}, *steps, i, j, time_left, slack)
+                   : a_.empty() ? contact_time<D>(d, v, sigma, slack)
+                                : contact_time<D>(d, v, a_[i] - a_[j], sigma, time_left, touching, slack);
   if (!(t + s < length_)) return;
   EventKey<D> key{.time = t + s, .kind = EventKind::pair, .lo = i, .hi = j, .image = image};
   if (!held_.empty() && scan_->rests(key)) return;
   key.generation = std::max(generation(i, key.time), generation(j, key.time));
   queue_.push_back({key, version(i), version(j)});
   if (!flights_.empty()) std::push_heap(queue_.begin(), queue_.end());
+}
+
+/// The time in which a pair reaches its core or a step.
+template <int D>
+double SlabCore<D>::step_time(const PairMotion<D>& motion, const PairSteps& steps, Id i, Id j, double time_left,
+                              double slack) const {
+  const double sigma = particles_.radius[i] + particles_.radius[j], tolerance = scan_->tolerance(sigma);
+  if (a_.empty()) return next_step_time<D>(steps, motion, sigma, tolerance, slack);
+  return next_step_time<D>(steps, motion, a_[i] - a_[j], sigma, time_left, tolerance, slack);
+}
+
+/// The step at which an event happens; null: it is a contact.
+template <int D>
+const StepSurface* SlabCore<D>::step_of(const EventKey<D>& key) const {
+  const PairSteps* const steps = key.kind == EventKind::pair ? scan_->steps(key.lo, key.hi) : nullptr;
+  if (!steps) return nullptr;
+  const Vec<D> d = position(key.lo, key.time) - position(key.hi, key.time) + box_.shift(key.image);
+  return step_at(*steps, d.norm(), particles_.radius[key.lo] + particles_.radius[key.hi]);
+}
+
+/// A time after an event at a step, until which the spheres move by a quarter of the tolerance.
+template <int D>
+double SlabCore<D>::end_after(const EventKey<D>& key) const {
+  const double sigma = particles_.radius[key.lo] + particles_.radius[key.hi];
+  const double speed = velocity(key.lo, key.time).norm() + velocity(key.hi, key.time).norm();
+  return key.time + 0.25 * scan_->tolerance(sigma) / speed;
 }
 
 template <int D>
@@ -459,13 +495,26 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
   } else {
     Flight& hi = flights_[slot_[key.hi] - 1];
     const Vec<D> d = lo.x - hi.x + box_.shift(key.image), v = lo.v - hi.v;
-    if (!(d.dot(v) < 0)) return;
-    const auto impulse = pair_impulse<D>(box_.contacts, d, v, partner(lo), partner(hi));
-    impulse.apply(d, particles_.mass[key.lo], lo.v, particles_.mass[key.hi], hi.v);
-    contact.impulse = impulse.on_first(d);
     contact.x_hi = hi.x - box_.shift(key.image);
-    contact.exchange = {.virial = (contact.x_lo - contact.x_hi).dot(impulse.factor * d),
-                        .dissipated = impulse.dissipated};
+    if (const StepSurface* const step = has_steps_ ? step_of(key) : nullptr) {
+      if (step->tether() && !(d.dot(v) > 0)) return;
+      const double inverse_mass = 1 / particles_.mass[key.lo] + 1 / particles_.mass[key.hi];
+      const auto met = step_impulse<D>(*step, d, v, inverse_mass,
+                                       tether_restitution<D>(box_.contacts, d, v, particles_.species[key.lo],
+                                                             particles_.species[key.hi], inverse_mass));
+      contact.impulse = met.factor * d;
+      lo.v += contact.impulse / particles_.mass[key.lo];
+      hi.v -= contact.impulse / particles_.mass[key.hi];
+      contact.exchange = {
+          .virial = d.dot(contact.impulse), .dissipated = met.dissipated, .stored = met.stored, .event = met.event};
+    } else {
+      if (!(d.dot(v) < 0)) return;
+      const auto impulse = pair_impulse<D>(box_.contacts, d, v, partner(lo), partner(hi));
+      impulse.apply(d, particles_.mass[key.lo], lo.v, particles_.mass[key.hi], hi.v);
+      contact.impulse = impulse.on_first(d);
+      contact.exchange = {.virial = (contact.x_lo - contact.x_hi).dot(impulse.factor * d),
+                          .dissipated = impulse.dissipated};
+    }
     contact.v_hi = hi.v;
     checks_path(hi);
   }

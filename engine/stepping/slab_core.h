@@ -20,6 +20,7 @@
 #include <cmath>
 #include <optional>
 
+#include "engine/events/step_event.h"
 #include "engine/ranks/system.h"
 #include "engine/stepping/contact_scan.h"
 
@@ -130,6 +131,10 @@ class SlabCore {
   FlightEnd<D> serve();
   void predict_pair(Id i, Id j, const Image<D>& image);
   void predict_walls(Id i);
+  double step_time(const PairMotion<D>& motion, const PairSteps& steps, Id i, Id j, double time_left,
+                   double slack) const;
+  const StepSurface* step_of(const EventKey<D>& key) const;
+  double end_after(const EventKey<D>& key) const;
   void predict_all(Id i);
   void predict_both(const EventKey<D>& key);
   template <class F>
@@ -161,6 +166,7 @@ class SlabCore {
   std::vector<Reaction<D>> reactions_;
   std::optional<ContactScan<D>> scan_;
   std::vector<Wall<D>> walls_;
+  bool has_steps_ = false;
   std::uint64_t max_events_, already_ = 0;
   double most_bend_;  // largest ½ a h² that is tried [length]
   Counters* counters_ = nullptr;

@@ -9,6 +9,7 @@
 #include "engine/run/step_choice.h"
 #include "engine/setup/epoch.h"
 #include "engine/setup/placement.h"
+#include "engine/setup/step_options.h"
 #include "io/deck/deck_source.h"
 #include "io/deck/memory.h"
 #include "io/deck/validate_state.h"
@@ -162,6 +163,8 @@ void fill_box(const Deck::Source& source, System<D>& system) {
   }
   for (const ValueTable& contact : source.values.list("contact"))
     if (!contact.wrong) add_contact<D>(system.box, system.species, contact.values);
+  for (const ValueTable& step : source.values.list("step"))
+    if (!step.wrong) add_step<D>(system.box, system.species, source.particles(), step.values);
 }
 
 template <int D>

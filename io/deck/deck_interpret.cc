@@ -7,6 +7,7 @@
 #include "engine/laws/contact_options.h"
 #include "engine/laws/wall_options.h"
 #include "engine/run/step_choice.h"
+#include "engine/setup/step_options.h"
 #include "io/deck/deck_source.h"
 #include "io/deck/options.h"
 
@@ -87,6 +88,14 @@ class Interpreter {
       for (ValueTable& contact : values_.list("contact"))
         if (!contact.wrong && !names.empty())
           contact.wrong = report(contact.at, [&] { add_contact(box, names, contact.values); });
+      for (ValueTable& step : values_.list("step"))
+        if (!step.wrong && !names.empty())
+          step.wrong = report(step.at, [&] { add_step(box, names, source_.particles(), step.values); });
+      if (source_.integrator != nullptr && !values_.list("step").empty())
+        report(values_.list("step").front().at, [&] {
+          if (const std::string no = source_.integrator->refusal(box.steps); !no.empty())
+            throw Error(Failure::deck, no);
+        });
       if (source_.edges.size() != dimension_ || walls.empty()) return;
       std::copy_n(source_.edges.begin(), dimension_, box.edges.begin());
       report(walls.back().at, [&] { box.check(Failure::deck); });

@@ -8,6 +8,7 @@
 #include "engine/laws/contact_options.h"
 #include "engine/laws/interaction.h"
 #include "engine/laws/wall_options.h"
+#include "engine/setup/step_options.h"
 
 namespace carom {
 namespace {
@@ -114,6 +115,10 @@ std::vector<TableSchema> make_schema() {
         boundary_key()}},
       {"contact", true, false, "the law of all contacts between two partners; contacts without one are elastic",
        contact_parameters()},
+      {"step", true, false,
+       "distances at which the energy of a pair jumps: square wells and shoulders between species, tethers and hard "
+       "bonds between listed pairs",
+       step_parameters()},
       {"wall", true, false, "a further wall, or a face of the box that is more than a fixed hard wall",
        wall_parameters()},
       {"bath", true, false, "a heat bath for all particles; at most one", bath_parameters()},

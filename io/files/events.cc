@@ -54,7 +54,10 @@ struct EventWriter<D>::Contents {
     slab.waiting.push_back(slabs_done);
     time_in_slab.waiting.push_back(c.key.time);
     generation.waiting.push_back(c.key.generation);
-    kind.waiting.push_back(static_cast<std::uint8_t>(c.key.kind));
+    constexpr std::uint8_t kFirstStep = 3;  // after the kinds of EventKind
+    const bool step = c.exchange.event != PairEvent::core;
+    kind.waiting.push_back(step ? kFirstStep - 1 + static_cast<std::uint8_t>(c.exchange.event)
+                                : static_cast<std::uint8_t>(c.key.kind));
     lo.waiting.push_back(c.key.lo);
     hi.waiting.push_back(c.key.hi);
     for (int k = 0; k < D; ++k) {

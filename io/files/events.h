@@ -7,7 +7,7 @@
 //   slab          number of the slab or epoch, from 0
 //   time_in_slab  the exact time, since the start of the slab
 //   generation    order within one instant
-//   kind          0 pair, 1 wall
+//   kind          0 pair, 1 wall, 2 kick; a pair at a step: 3 enters, 4 leaves, 5 bounces
 //   lo, hi        lower and higher id; at a wall: the particle, and the number of the wall (2·axis + (0 lower, 1 upper)
 //                 for faces of the box)
 //   image         [D] how many box edges `hi` is shifted by

@@ -58,7 +58,9 @@ const std::vector<Column<D>>& columns() {
       {"rotational_temperature", number, "energy", "Σ I ω²/(f N), f = 1 in two dimensions, 3 in three",  //
        [](S s, int) { return s.rotational_temperature; }, "rotational_temperature", "rotational_temperature"},
       {"step_length", number, "time", "length of the last step or epoch",  //
-       [](S s, int) { return s.step_length; }, "step_length", "step_length"}};
+       [](S s, int) { return s.step_length; }, "step_length", "step_length"},
+      {"bonds", number, "-", "pairs inside the outermost of their steps, for each particle",  //
+       [](S s, int) { return s.bonds; }, "bonds", "bonds"}};
   return all;
 }
 template const std::vector<Column<2>>& columns();

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+// When a pair of spheres reaches one of its steps (laws/steps.h) or its core, and what happens there.
+//
+// Nothing is stored about the side of a step on which a pair is. It follows from the distance; within the gap tolerance
+// of a step it follows from the direction of the relative motion, because after an event a pair moves away from the
+// step into the side on which it is. A third sphere that turns this motion while the pair is within the tolerance
+// makes the pair change sides unseen. Monitor compares the energy of the steps with the ledger, so that this ends the
+// run.
+
+#include "engine/events/contact.h"
+#include "engine/laws/contact_log.h"
+#include "engine/laws/steps.h"
+
+namespace carom {
+
+/// The motion of a pair: d = x_i − x_j of the image that is near, v its velocity, and b = d·v.
+template <int D>
+struct PairMotion {
+  Vec<D> d, v;
+  double b = d.dot(v), distance = d.norm();
+};
+
+/// The number of steps outside of which a pair is. `tolerance` and `slack` as in contact.h: a pair that neither
+/// approaches nor recedes is outside, because on a tangent it recedes. A tether is never passed; images beyond it are
+/// not tethered.
+template <int D>
+std::size_t steps_passed(const PairSteps& steps, const PairMotion<D>& motion, double sigma, double tolerance,
+                         double slack) {
+  std::size_t passed = 0;
+  for (const StepSurface& each : steps.surfaces) {
+    const double gap = motion.distance - each.distance(sigma);
+    if (gap < -tolerance || (gap <= tolerance && (each.tether() || motion.b < -slack))) break;
+    ++passed;
+  }
+  return passed;
+}
+
+/// Straight relative motion: the first time at which |d + v s| is not below `range` and grows.
+template <int D>
+double leaving_time(const PairMotion<D>& motion, double range, double slack) {
+  const auto& [d, v, b, distance] = motion;
+  const double v2 = v.squaredNorm(), c = d.squaredNorm() - range * range;
+  if (v2 == 0) return kNever;
+  if (c >= 0 && b >= 0) return b > slack ? 0.0 : (2 * slack - b) / v2;  // on a tangent, until it clearly recedes
+  const double root = std::sqrt(std::max(0.0, v2 * range * range - squared_cross<D>(d, v)));
+  return b > 0 ? -c / (b + root) : (root - b) / v2;
+}
+
+/// Parabolic relative motion d + v s + a s²/2: as above, in [0, time_left). `touching` divides out the root s = 0 of a
+/// pair that is at `range`.
+template <int D>
+double leaving_time(const PairMotion<D>& motion, const Vec<D>& a, double range, double time_left, bool touching,
+                    double slack) {
+  const auto& [d, v, b, distance] = motion;
+  const double c0 = range * range - d.squaredNorm();
+  const Polynomial<4> room{{c0, -2 * b, -v.squaredNorm() - d.dot(a), -v.dot(a), -0.25 * a.squaredNorm()}};
+  double s;
+  if (touching) {
+    if (b > slack) return 0;
+    s = first_fall(Polynomial<3>{{b >= -slack ? 0.0 : -2 * b, room.c[2], room.c[3], room.c[4]}}, time_left);
+  } else {
+    s = first_fall(room, time_left);
+  }
+  if (s == 0 || s == kNever) return s;
+  const Vec<D> at = d + s * v + (0.5 * s * s) * a;  // a Newton step on the vectors themselves
+  const double rising = at.dot(v + s * a);
+  if (rising > 0) {
+    const double correction = 0.5 * (at.squaredNorm() - range * range) / rising;
+    if (std::abs(correction) < 1e-6 * s) s -= correction;
+  }
+  return s < time_left ? s : kNever;
+}
+
+/// The time until a pair with straight relative motion reaches its core or a step.
+template <int D>
+double next_step_time(const PairSteps& steps, const PairMotion<D>& motion, double sigma, double tolerance,
+                      double slack) {
+  const std::size_t passed = steps_passed(steps, motion, sigma, tolerance, slack);
+  const double inside = passed == 0 ? steps.core_distance(sigma) : steps.surfaces[passed - 1].distance(sigma);
+  const double entering = contact_time<D>(motion.d, motion.v, inside, slack);
+  if (entering < kNever || passed == steps.surfaces.size()) return entering;
+  return leaving_time(motion, steps.surfaces[passed].distance(sigma), slack);
+}
+
+/// The same for parabolic relative motion, in [0, time_left).
+template <int D>
+double next_step_time(const PairSteps& steps, const PairMotion<D>& motion, const Vec<D>& a, double sigma,
+                      double time_left, double tolerance, double slack) {
+  const std::size_t passed = steps_passed(steps, motion, sigma, tolerance, slack), number = steps.surfaces.size();
+  const double inside = passed == 0 ? steps.core_distance(sigma) : steps.surfaces[passed - 1].distance(sigma);
+  const double outside = passed == number ? kNever : steps.surfaces[passed].distance(sigma);
+  const double path = time_left * (motion.v.norm() + 0.5 * time_left * a.norm()) + tolerance;
+  if (motion.distance - path > inside && motion.distance + path < outside) return kNever;
+  const auto touching = [&](double range) { return std::abs(motion.distance - range) <= tolerance; };
+  const bool overlapping = motion.distance <= inside + tolerance;
+  const double entering = contact_time<D>(motion.d, motion.v, a, inside, time_left, overlapping, slack);
+  if (outside == kNever) return entering;
+  return std::min(entering, leaving_time(motion, a, outside, time_left, touching(outside), slack));
+}
+
+/// The step that a pair reaches at this distance; null: it reaches its core.
+inline const StepSurface* step_at(const PairSteps& steps, double distance, double sigma) {
+  const StepSurface* nearest = nullptr;
+  double gap = std::abs(distance - steps.core_distance(sigma));
+  for (const StepSurface& each : steps.surfaces)
+    if (const double other = std::abs(distance - each.distance(sigma)); other < gap) gap = other, nearest = &each;
+  return nearest;
+}
+
+/// What happens to a pair at a step: the impulse is factor·d on the first sphere.
+struct StepImpulse {
+  double factor = 0;
+  double stored = 0;      ///< the energy that goes from the motion into the potential [energy]
+  double dissipated = 0;  ///< the energy that a tether takes [energy]
+  PairEvent event = PairEvent::bounce;
+};
+
+/// A pair reaches a step. It crosses if b² > 2 c d² (1/m_i + 1/m_j), where c is the energy that it must climb, and
+/// then b² decreases by this number; otherwise b changes its sign (Alder, Wainwright, J. Chem. Phys. 31 (1959) 459).
+/// The factor has no cancellation for small c, and d is not normalised, so that the kinetic energy changes by −c to
+/// rounding. `restitution`: of tethers.
+template <int D>
+StepImpulse step_impulse(const StepSurface& step, const Vec<D>& d, const Vec<D>& v, double inverse_mass,
+                         double restitution) {
+  const double b = d.dot(v), weight = d.squaredNorm() * inverse_mass;
+  if (step.tether())
+    return {.factor = -(1 + restitution) * b / weight,
+            .dissipated = 0.5 * (1 - restitution * restitution) * b * b / weight};
+  const double climb = b > 0 ? step.climb : -step.climb, left = b * b - 2 * climb * weight;
+  if (!(left > 0)) return {.factor = -2 * b / weight};
+  return {.factor = -2 * climb / (b + std::copysign(std::sqrt(left), b)),
+          .stored = climb,
+          .event = b > 0 ? PairEvent::leave : PairEvent::enter};
+}
+
+}  // namespace carom
