@@ -118,7 +118,22 @@ def random_walls(dice, boundary, end):
 def random_bath(dice, end):
     """A bath, with a ramp or without, that acts between once in ten runs and ten times a run."""
     temperature = dice.choice([dice.uniform(0.5, 2.0), [dice.uniform(0.5, 2.0), dice.uniform(0.5, 2.0)]])
-    return {"type": dice.choice(["andersen", "rescaling"]), "temperature": temperature, "rate": 10**dice.uniform(-1, 1) / end}
+    kind = dice.choice(["andersen", "rescaling", "langevin"])
+    return {"type": kind, "temperature": temperature, "friction" if kind == "langevin" else "rate": 10**dice.uniform(-1, 1) / end}
+
+
+def random_steps(dice, lattice, count, species):
+    """Wells and shoulders between species, and tethers along the rows of a lattice."""
+    steps, names = [], ["*", *species]
+    for _ in range(dice.choice([1, 1, 2])):
+        number = dice.choice([1, 1, 2])
+        ranges = sorted(dice.uniform(1.02, 1.7) for _ in range(number))
+        steps.append({"between": [dice.choice(names), dice.choice(names)], "range": ranges if number > 1 else ranges[0],
+                      "depth": [dice.uniform(-1, 2) for _ in ranges] if number > 1 else dice.uniform(-1, 2)})
+    if lattice in ("square", "simple-cubic") and dice.random() < 0.4:
+        edge = round(count**(1 / (2 if lattice == "square" else 3)))
+        steps.append({"chain": True, "chain_length": edge, "tether": dice.uniform(1.3, 2.0)})
+    return steps
 
 
 def random_contacts(dice, boundary, walls, species):
@@ -189,10 +204,12 @@ def random_deck(dice, seconds):
     contacts = random_contacts(dice, boundary, walls, [each["name"] for each in particles]) if dissipates else []
     if any("tangential" in law for law in contacts) and dice.random() < 0.7:
         particles[0] |= {"rotational_temperature": dice.uniform(0, 2.0), "inertia": dice.uniform(0.1, 0.6)}
+    steps = random_steps(dice, lattice, count, [each["name"] for each in particles]) \
+        if method in ("free-flight", "psa", "edda") and dice.random() < 0.4 else []
     if method in ("cdda", "edda") and (dice.random() < 0.4):
         integrator["accuracy"] = dice.choice([1e-2, 1e-3, 1e-4])
     return {"format": 1, "system": {"dimension": dimension, "boundary": boundary},
-            "wall": walls, "contact": contacts, "bath": [bath] if bath else [], "particles": particles,
+            "wall": walls, "contact": contacts, "step": steps, "bath": [bath] if bath else [], "particles": particles,
             "placement": {"type": lattice, "packing_fraction": packing, "seed": dice.randrange(1000)},
             "interaction": random_forces(dice, method, dimension, boundary, [each["name"] for each in particles]),
             "integrator": integrator, "run": run, "output": output}
@@ -202,7 +219,7 @@ def words(deck):
     """A deck in a line."""
     n = sum(species["count"] for species in deck["particles"])
     forces = "+".join(term["type"] for term in deck["interaction"]) or "no forces"
-    more = "".join(f", {kind}" for kind in ("wall", "contact", "bath") if deck.get(kind))
+    more = "".join(f", {kind}" for kind in ("wall", "contact", "step", "bath") if deck.get(kind))
     more += ", spins" if any("tangential" in law for law in deck.get("contact", [])) else ""
     return f"{deck['integrator']['type']} {deck['system']['dimension']}-D {n} {forces} {'/'.join(deck['system']['boundary'])}{more}"
 

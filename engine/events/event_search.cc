@@ -155,7 +155,7 @@ void EventSearch<D>::offer_all(const ScanTask& task) {
     const Slot j = flights_.packing().slot(candidate);
     if (j == task.self) continue;
     const double time = flights_.pair_contact(task.self, j, box_.shift(flights_.packing().image(candidate)));
-    queue_.offer(task.self, time, EventKind::pair, candidate);
+    if (time <= queue_[task.self].contact && time < kNever) queue_.offer(task.self, time, EventKind::pair, candidate);
   }
 }
 

@@ -140,8 +140,8 @@ double Flights<D>::pair_contact(Slot i, const Record<D>& a, Slot j, const Record
   d += shift;
   const double radii = radius(i) + radius(j), sigma = grown(radii, now), rate = radii * growth_;
   if (const PairSteps* const steps = steps_of(a, b)) [[unlikely]]
-    return now + next_step_time<D>(*steps, {d, v}, sigma, gap_tolerance_(sigma),
-                                   approach_slack(sigma, a.v.norm(), b.v.norm()));
+    return now + next_step_time<D>(*steps, d, v, sigma, gap_tolerance_(sigma),
+                                   [&] { return approach_slack(sigma, a.v.norm(), b.v.norm()); });
   const bool apart = d.squaredNorm() > sigma * sigma;
   const double slack = apart ? 0 : approach_slack(sigma, a.v.norm(), b.v.norm() + rate);
   return now + contact_time<D>(d, v, sigma, rate, slack);

@@ -36,6 +36,10 @@ std::size_t steps_passed(const PairSteps& steps, const PairMotion<D>& motion, do
   return passed;
 }
 
+/// Pairs that are nearer to a step, relative to the square of its distance, are looked at more closely: far more than
+/// the tolerance and than rounding, and few pairs.
+inline constexpr double kNearStep = 1e-9;
+
 /// Straight relative motion: the first time at which |d + v s| is not below `range` and grows.
 template <int D>
 double leaving_time(const PairMotion<D>& motion, double range, double slack) {
@@ -72,15 +76,39 @@ double leaving_time(const PairMotion<D>& motion, const Vec<D>& a, double range, 
   return s < time_left ? s : kNever;
 }
 
-/// The time until a pair with straight relative motion reaches its core or a step.
-template <int D>
-double next_step_time(const PairSteps& steps, const PairMotion<D>& motion, double sigma, double tolerance,
-                      double slack) {
-  const std::size_t passed = steps_passed(steps, motion, sigma, tolerance, slack);
-  const double inside = passed == 0 ? steps.core_distance(sigma) : steps.surfaces[passed - 1].distance(sigma);
-  const double entering = contact_time<D>(motion.d, motion.v, inside, slack);
-  if (entering < kNever || passed == steps.surfaces.size()) return entering;
-  return leaving_time(motion, steps.surfaces[passed].distance(sigma), slack);
+/// The time until a pair with straight relative motion reaches its core or a step. `slack()` as in wall_meeting().
+template <int D, class Slack>
+[[gnu::always_inline]] inline double next_step_time(const PairSteps& steps, const Vec<D>& d, const Vec<D>& v,
+                                                    double sigma, double tolerance, Slack&& slack) {
+  const double squared = d.squaredNorm(), b = d.dot(v);
+  double inside = steps.core_distance(sigma), outside = kNever;
+  bool near = squared <= inside * inside * (1 + kNearStep);
+  for (const StepSurface& each : steps.surfaces) {
+    const double range = each.distance(sigma), gap = squared - range * range;
+    near = near || std::abs(gap) <= kNearStep * squared + 4 * tolerance * range;
+    if (gap < 0) {
+      outside = range;
+      break;
+    }
+    inside = range;
+  }
+  if (near) [[unlikely]] {
+    const PairMotion<D> motion{d, v};
+    const double least = slack();
+    const std::size_t passed = steps_passed(steps, motion, sigma, tolerance, least);
+    inside = passed == 0 ? steps.core_distance(sigma) : steps.surfaces[passed - 1].distance(sigma);
+    const double entering = contact_time<D>(d, v, inside, least);
+    if (entering < kNever || passed == steps.surfaces.size()) return entering;
+    return leaving_time(motion, steps.surfaces[passed].distance(sigma), least);
+  }
+  if (outside == kNever && b >= 0) return kNever;
+  const double v2 = v.squaredNorm(), across = squared_cross<D>(d, v);
+  if (b < 0)
+    if (const double discriminant = v2 * inside * inside - across; discriminant > 0)
+      return (squared - inside * inside) / (std::sqrt(discriminant) - b);
+  if (outside == kNever || v2 == 0) return kNever;
+  const double root = std::sqrt(v2 * outside * outside - across);
+  return b > 0 ? (outside * outside - squared) / (b + root) : (root - b) / v2;
 }
 
 /// The same for parabolic relative motion, in [0, time_left).

@@ -183,9 +183,10 @@ struct MotionSums {
   }
 };
 
-/// Sums over this rank's own particles: the momentum in `state`, the rest in `at`.
+/// Sums over this rank's own particles: the momentum in `state`, the rest in `at`. `near`: for own_steps().
 template <int D>
-MotionSums<D> own_motion(const System<D>& system, const Particles<D>& state, const Particles<D>& at) {
+MotionSums<D> own_motion(const System<D>& system, const Particles<D>& state, const Particles<D>& at,
+                         NeighbourList<D>* near = nullptr) {
   ExactSeries kinetic, speed;
   std::array<ExactSeries, D> momentum;
   double fastest = 0, farthest = 0;
@@ -198,7 +199,7 @@ MotionSums<D> own_motion(const System<D>& system, const Particles<D>& state, con
     farthest = std::max(farthest, at.x[i].cwiseAbs().maxCoeff());
     for (int k = 0; k < D; ++k) momentum[k].add(moving_mass(state.mass[i]) * state.v[i][k]);
   }
-  MotionSums<D> sums{kinetic.sum(), {}, speed.sum(), {}, std::sqrt(fastest), farthest, own_steps(system, at)};
+  MotionSums<D> sums{kinetic.sum(), {}, speed.sum(), {}, std::sqrt(fastest), farthest, own_steps(system, at, near)};
   if (system.box.contacts.rough()) {
     ExactSeries rotational;
     for (Id i = 0; i < at.size(); ++i)

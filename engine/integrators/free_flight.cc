@@ -118,7 +118,7 @@ IntegratorInfo free_flight() {
   epoch.meaning =
       "length of an epoch, after which all particles are moved to the same time; default: about forty mean free times, "
       "but at most the time in which a sphere flies four times the longest edge, and a tenth of the relaxation time of "
-      "a bath of type rescaling, which acts at the ends of epochs";
+      "a bath of type rescaling or langevin, which acts at the ends of epochs";
   Parameter lengthen{.name = "lengthen",
                      .type = Parameter::Type::boolean,
                      .fallback = "none",

@@ -15,22 +15,39 @@ const std::vector<Parameter>& bath_parameters() {
        "-",
        "andersen: at random times a particle gets a new velocity from the distribution of Maxwell and Boltzmann, in "
        "methods with steps at the end of the step; "
-       "rescaling: all velocities are scaled by a common random factor, so that the kinetic energy is canonical",
+       "rescaling: all velocities are scaled by a common random factor, so that the kinetic energy is canonical; "
+       "langevin: friction and noise at the end of each step or epoch",
        Range::any,
-       {"andersen", "rescaling"}},
+       {"andersen", "rescaling", "langevin"}},
       {"temperature", real_or_list, "", "energy", "a number, or [first, last]: a linear ramp", Range::positive},
       {"ramp_time", real_list, "none", "time",
        "[start, end] of the ramp, before and after which the temperature is constant; default: start and end of the "
        "run. It stays if the run is continued to another end"},
-      {"rate", real, "", "1/time", "kicks of a particle per unit time; rescaling: 1/relaxation time", Range::positive},
+      {"rate", real, "none", "1/time", "andersen: kicks of a particle per unit time; rescaling: 1/relaxation time",
+       Range::positive},
+      {"friction", real_or_list, "none", "1/time",
+       "langevin: the rate at which friction damps velocities, or a list with one for each species", Range::positive},
       {"seed", integer, "none", "-", "seed of the random numbers; default: that of [placement]", Range::non_negative}};
   return all;
 }
 
 Bath bath_of(const Parameters& given, std::uint64_t seed) {
-  Bath bath{.type = given.text("type") == "andersen" ? Bath::Type::andersen : Bath::Type::rescaling,
-            .rate = given.real("rate"),
+  const std::string& type = given.text("type");
+  Bath bath{.type = type == "andersen"    ? Bath::Type::andersen
+                    : type == "rescaling" ? Bath::Type::rescaling
+                                          : Bath::Type::langevin,
             .seed = seed};
+  for (const char* key : {"rate", "friction"}) {
+    const bool wanted = bath.damps() == (key == std::string_view("friction"));
+    if (given.has(key) != wanted)
+      throw Error(Failure::deck, "a bath of type " + type + (wanted ? " needs '" : " has no '") + key + "'; " +
+                                     (wanted         ? "add it: a number in 1/time"
+                                      : bath.damps() ? "give 'friction'"
+                                                     : "give 'rate'"));
+  }
+  if (const auto* rate = given.find<double>("rate")) bath.rate = *rate;
+  if (const auto* one = given.find<double>("friction")) bath.friction = {*one};
+  if (const auto* all = given.find<std::vector<double>>("friction")) bath.friction = *all;
   if (const auto* own = given.find<std::int64_t>("seed")) bath.seed = static_cast<std::uint64_t>(*own);
   if (const auto* constant = given.find<double>("temperature")) bath.set_temperature(*constant);
   if (const auto* ramp = given.find<std::vector<double>>("temperature")) {

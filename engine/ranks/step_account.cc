@@ -3,18 +3,16 @@
 
 #include "engine/events/step_event.h"
 #include "engine/ranks/halo.h"
-#include "engine/search/neighbour_list.h"
 
 namespace carom {
 
 template <int D>
-StepAccount own_steps(const System<D>& system, const Particles<D>& state) {
+StepAccount own_steps(const System<D>& system, const Particles<D>& state, NeighbourList<D>* known) {
   StepAccount own;
   const Box<D>& box = system.box;
   if (box.steps.empty()) return own;
   const GapTolerance tolerance = box.gap_tolerance();
-  const auto count = [&](const Particles<D>& p) {
-    NeighbourList<D> near(box, box.steps.reach()(p.radius), p.ghost, p.all_fixed());
+  const auto count = [&](const Particles<D>& p, NeighbourList<D>& near) {
     for (const auto& [i, j, image] : near.cover(p.x)) {
       const PairSteps* const steps = box.steps.find(p.id_of(i), p.species[i], p.id_of(j), p.species[j]);
       if (!steps) continue;
@@ -29,14 +27,20 @@ StepAccount own_steps(const System<D>& system, const Particles<D>& state) {
     }
   };
   Decomposition<D>& ranks = const_cast<System<D>&>(system).decomposition;
-  if (ranks.joined() && !ranks.by_place())
-    count(halo_of(box, 2 * box.steps.reach()(ranks.sizes().largest_radius()), ranks.ranks(), state));
-  else
-    count(state);
+  if (ranks.joined() && !ranks.by_place()) {
+    const auto halo = halo_of(box, 2 * box.steps.reach()(ranks.sizes().largest_radius()), ranks.ranks(), state);
+    NeighbourList<D> near = step_pairs(system, halo);
+    count(halo, near);
+  } else if (known) {
+    count(state, *known);
+  } else {
+    NeighbourList<D> near = step_pairs(system, state);
+    count(state, near);
+  }
   return own;
 }
 
-template StepAccount own_steps(const System<2>&, const Particles<2>&);
-template StepAccount own_steps(const System<3>&, const Particles<3>&);
+template StepAccount own_steps(const System<2>&, const Particles<2>&, NeighbourList<2>*);
+template StepAccount own_steps(const System<3>&, const Particles<3>&, NeighbourList<3>*);
 
 }  // namespace carom

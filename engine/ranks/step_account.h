@@ -5,6 +5,7 @@
 #include "engine/base/exact_sum.h"
 #include "engine/base/particles.h"
 #include "engine/ranks/system.h"
+#include "engine/search/neighbour_list.h"
 
 namespace carom {
 
@@ -20,8 +21,15 @@ struct StepAccount {
   }
 };
 
-/// What this rank's pairs contribute; `state`: positions and velocities of this rank's particles. Collective.
+/// What this rank's pairs contribute; `state`: positions and velocities of this rank's particles. `near`: pairs within
+/// reach, from an earlier call; null: they are searched for. Collective.
 template <int D>
-StepAccount own_steps(const System<D>& system, const Particles<D>& state);
+StepAccount own_steps(const System<D>& system, const Particles<D>& state, NeighbourList<D>* near = nullptr);
+
+/// The list for own_steps().
+template <int D>
+NeighbourList<D> step_pairs(const System<D>& system, const Particles<D>& state) {
+  return NeighbourList<D>(system.box, system.box.steps.reach()(state.radius), state.ghost, state.all_fixed());
+}
 
 }  // namespace carom

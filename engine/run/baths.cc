@@ -86,6 +86,23 @@ void kick_all(System<D>& system, double start, double length, Counters& counters
   counters.heat.add(sum_over_all<D>(system, [&](Id i) { return gained[i]; }));
 }
 
+template <int D>
+void damp(System<D>& system, double time, double length, Counters& counters) {
+  const Bath& bath = system.box.bath;
+  auto& p = system.particles;
+  std::vector<double> gained(p.size(), 0.0);
+  for (Id i = 0; i < p.size(); ++i) {
+    if (p.fixed(i)) continue;
+    const double decay = -length * bath.friction_of(p.species[i]), before = p.v[i].squaredNorm();
+    const double kept = elementary::exp(decay), fresh = std::sqrt(-elementary::expm1(2 * decay));
+    p.v[i] = kept * p.v[i] + fresh * kicked_velocity<D>(bath, p.mass[i], {.id = p.id_of(i), .time = time});
+    gained[i] = 0.5 * p.mass[i] * (p.v[i].squaredNorm() - before);
+  }
+  counters.heat.add(sum_over_all<D>(system, [&](Id i) { return gained[i]; }));
+}
+
+template void damp(System<2>&, double, double, Counters&);
+template void damp(System<3>&, double, double, Counters&);
 template void rescale(System<2>&, std::int64_t, double, double, Counters&);
 template void rescale(System<3>&, std::int64_t, double, double, Counters&);
 template void kick_all(System<2>&, double, double, Counters&);

@@ -97,11 +97,13 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
       this,
       [this] {
         touching_.reset();
+        stepping_.reset();
         std::vector<Vec<D>>().swap(scratch_);
       },
       [this] {
         const Particles<D>& p = system_.particles;
         if (info_.hard_cores) touching_.emplace(system_.box, p.radius, p.ghost, p.all_fixed());
+        if (!system_.box.steps.empty()) stepping_.emplace(step_pairs(system_, p));
         if (info_.shadow) scratch_.resize(p.size());
       });
 }
@@ -363,7 +365,9 @@ typename Monitor<D>::Waiting Monitor<D>::observed(double time, const Particles<D
   Waiting now{time,
               statistics_.steps,
               &state,
-              {own_motion(system_, state, nodes), potential ? *potential : own_energy<D>(system_, nodes.x), {}},
+              {own_motion(system_, state, nodes, stepping_ ? &*stepping_ : nullptr),
+               potential ? *potential : own_energy<D>(system_, nodes.x),
+               {}},
               statistics_.counters};
   Counters uncounted;
   if (with_shadow) now.shadow_term = shadow_term<D>(system_, nodes, integrator->accelerations(), scratch_, uncounted);

@@ -171,6 +171,7 @@ class Monitor {
   Tail tail_;                                 // added to output, not to H and its errors
   std::vector<Vec<D>> scratch_;               // for S_h
   std::optional<NeighbourList<D>> touching_;  // pairs that may overlap
+  std::optional<NeighbourList<D>> stepping_;  // pairs that may have a step between them
   Particles<D> gathered_;                     // collected from the blocks of all ranks
 };
 

@@ -311,7 +311,7 @@ void Simulation<D>::run(const Hooks& hooks) {
     act_of_bath(slab, complete, report);
     if (info_.adapts) adapt(slab, report, 2 * pairs + walls, complete);
     if (complete > 0) s.step_length = complete;
-    if (complete > 0 && !system_->box.bath.rescales() && !clock_.adapts()) lengthen_slabs(complete);
+    if (complete > 0 && !system_->box.bath.acts_at_ends() && !clock_.adapts()) lengthen_slabs(complete);
     if (!info_.stepping && plan_.collisions && !plan_.end_time && !plan_.steps) need_collisions();
     s.force_passes = s.counters.force_passes;
     s.fraction_done = clock_.fraction_done(s);
@@ -384,14 +384,15 @@ bool Simulation<D>::fly(Slab& slab, SlabReport<D>& report, SlabWatch& watch) {
     }
 }
 
-/// What the bath does at the end of a slab: rescaling at the end of a step or epoch of the length `complete` (0: it
-/// goes on), all kicks of a slab of a stepping method.
+/// What the bath does at the end of a slab: rescaling or damping at the end of a step or epoch of the length `complete`
+/// (0: it goes on), all kicks of a slab of a stepping method.
 template <int D>
 void Simulation<D>::act_of_bath(const Slab& slab, double complete, SlabReport<D>& report) {
   const Bath& bath = system_->box.bath;
   const double start = clock_.adapts() ? slab.start : clock_.time_after(slab.index),
                length = clock_.adapts() ? slab.length : clock_.length_from(start);
   if (bath.rescales() && complete > 0) rescale(*system_, slab.index, start + length, length, report.counters);
+  if (bath.damps() && complete > 0) damp(*system_, start + length, length, report.counters);
   if (bath.kicks() && info_.stepping) kick_all(*system_, slab.start, slab.length, report.counters);
 }
 

@@ -85,7 +85,7 @@ double default_epoch(const System<D>& system) {
   const Bath& bath = system.box.bath;
   const double farthest = kFarthestInBoxes * system.box.edges.maxCoeff();
   double epoch = std::min(kEventsOfEpoch / rate, farthest / std::max(thermal_speed, light_speed));
-  if (bath.rescales()) epoch = std::min(epoch, kEpochOfRelaxation / bath.rate);
+  if (bath.acts_at_ends()) epoch = std::min(epoch, kEpochOfRelaxation / bath.relaxation_rate());
   // The images of the fastest particles, also in equilibrium, must fit into a candidate on any number of ranks.
   const double speed = std::max(fastest, 5 * light_speed);
   const Packing<D> packing(1, system.size());  // largest() depends on the number of particles only

@@ -325,7 +325,7 @@ template <int D>
 double SlabCore<D>::step_time(const PairMotion<D>& motion, const PairSteps& steps, Id i, Id j, double time_left,
                               double slack) const {
   const double sigma = particles_.radius[i] + particles_.radius[j], tolerance = scan_->tolerance(sigma);
-  if (a_.empty()) return next_step_time<D>(steps, motion, sigma, tolerance, slack);
+  if (a_.empty()) return next_step_time<D>(steps, motion.d, motion.v, sigma, tolerance, [&] { return slack; });
   return next_step_time<D>(steps, motion, a_[i] - a_[j], sigma, time_left, tolerance, slack);
 }
 

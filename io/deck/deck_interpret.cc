@@ -155,8 +155,14 @@ class Interpreter {
     source_.species.push_back(std::move(species));
   }
 
-  /// Spheres have a radius, and points have none.
+  /// Spheres have a radius, and points have none. A list of frictions has one for each species.
   void cores() {
+    if (const ValueTable* bath = values_.find("bath"))
+      if (const auto* all = bath->find<std::vector<double>>("friction"); all && all->size() != source_.species.size())
+        problems_.error(bath->place("friction"),
+                        "'friction' has " + count_of(all->size(), "number") + " for " +
+                            std::to_string(source_.species.size()) + " species",
+                        "give one number for all, or one for each [[particles]] in their order");
     if (!source_.species.empty() && std::ranges::all_of(source_.species, &SpeciesConfig::fixed))
       problems_.error(source_.species.front().at, "all particles are fixed, and nothing would move",
                       "let some move: fixed = false");

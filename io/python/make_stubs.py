@@ -47,9 +47,10 @@ ARGUMENTS = {"box": "npt.ArrayLike", "boundary": "Boundary | Sequence[Boundary]"
              "expression": "str | Callable[..., Any]", "start": "float", "cutoff": "float", "tolerance": "float",
              "options": "Mapping[str, Any]", "constants": "Any", "name": "str", "normal": "npt.ArrayLike",
              "atom_style": "str", "one": "str", "other": "str", "rate": "float", "spin": "npt.ArrayLike", "inertia": "float",
-             "ramp_time": "Sequence[float]"}
+             "ramp_time": "Sequence[float]", "friction": "float | Sequence[float]", "between": "str"}
 RESULTS = {"__init__": "None", "from_deck": "Simulation", "from_run": "Simulation", "from_file": "Simulation",
-           "add_particles": "range", "add_wall": "None", "add_contact": "None", "add_bath": "None", "place": "range", "thermalize": "None",
+           "add_particles": "range", "add_wall": "None", "add_contact": "None", "add_step": "None", "add_bath": "None", "place": "range",
+           "thermalize": "None",
            "add_potential": "Sampled", "output": "None",
            "open": "Run", "view": "Page", "run": "None", "write_deck": "None", "__len__": "int", "__repr__": "str"}
 PROPERTIES = {"position": "npt.NDArray[np.float64]", "velocity": "npt.NDArray[np.float64]",
@@ -58,6 +59,7 @@ PROPERTIES = {"position": "npt.NDArray[np.float64]", "velocity": "npt.NDArray[np
               "radius": "npt.NDArray[np.float64]", "charge": "npt.NDArray[np.float64]",
               "species": "npt.NDArray[np.uint16]", "momentum": "npt.NDArray[np.float64]", "species_names": "list[str]",
               "box": "list[float]", "boundary": "list[str]", "walls": "list[dict[str, Any]]", "contacts": "list[dict[str, Any]]",
+              "steps": "list[dict[str, Any]]",
               "wall_loads": "dict[str, float]",
               "bath": "dict[str, Any] | None", "bath_temperature": "float | list[float] | None",
               "title": "str", "description": "str", "step": "int", "collisions": "int", "directory": "str | None",

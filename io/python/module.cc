@@ -314,6 +314,7 @@ py::dict descriptors() {
   };
   all["walls"] = table("wall");
   all["contacts"] = table("contact");
+  all["steps"] = table("step");
   all["baths"] = table("bath");
   return all;
 }

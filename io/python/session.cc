@@ -14,6 +14,7 @@
 #include "engine/run/state.h"
 #include "engine/run/step_choice.h"
 #include "engine/setup/epoch.h"
+#include "engine/setup/step_options.h"
 #include "io/files/log_report.h"
 
 namespace carom::python {
@@ -154,6 +155,7 @@ void Session<D>::add_particles(const Columns& columns) {
         if (const std::string error = beyond_limits(each); !error.empty())
           throw Error(Failure::initial_state, std::string("add_particles: a number in '") + what + "' " + error);
     if (columns.inertia != 0) set_inertia(columns.species, columns.inertia);
+    if (!values_.list("step").empty()) set_pair_steps(values_.list("step"));
     system_->wrap(Failure::initial_state);
     make_terms(*system_);
   } catch (...) {
@@ -255,10 +257,14 @@ template <int D>
 void Session<D>::set(const std::string& name, Parameters given) {
   if (name == "wall") return set_wall(std::move(given));
   if (name == "contact") return add_contact(std::move(given));
+  if (name == "step") return add_step(std::move(given));
   if (name == "interaction") return add_force(std::move(given));
   ValueTable table = table_of(name, std::move(given));
   if (name == "bath") {
     const Bath bath = bath_of(table.values);
+    if (bath.friction.size() > 1 && bath.friction.size() != species_.size())
+      refuse("'friction' has " + std::to_string(bath.friction.size()) + " numbers for " +
+             std::to_string(species_.size()) + " species; give one number for all, or one for each");
     change("set a bath");
     system_->box.bath = box_.bath = bath;
   } else if (name == "integrator") {
@@ -336,6 +342,25 @@ void Session<D>::set_contacts(std::vector<ValueTable> all) {
   for (const ValueTable& each : all) carom::add_contact<D>(box, species_, each.values);
   system_->box = box_ = box;
   values_.list("contact") = std::move(all);
+}
+
+template <int D>
+void Session<D>::add_step(Parameters given) {
+  if (running_) refuse("a run is going on; add steps before it or after it");
+  auto all = values_.list("step");
+  all.push_back(table_of("step", std::move(given)));
+  set_pair_steps(std::move(all));
+  change("add steps");
+}
+
+/// Sets these steps for the present species and particles.
+template <int D>
+void Session<D>::set_pair_steps(std::vector<ValueTable> all) {
+  Box<D> box = box_;
+  box.steps = {};
+  for (const ValueTable& each : all) carom::add_step<D>(box, species_, size_, each.values);
+  system_->box = box_ = box;
+  values_.list("step") = std::move(all);
 }
 
 template <int D>

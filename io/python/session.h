@@ -116,6 +116,8 @@ class Session : Observer<D> {
   double present() const { return showing_ ? shot_->time : statistics().end_time; }
   void set_wall(Parameters given);
   void add_contact(Parameters given);
+  void add_step(Parameters given);
+  void set_pair_steps(std::vector<ValueTable> all);
   void add_force(Parameters given);
   void set_contacts(std::vector<ValueTable> all);
   void make_terms(System<D>& system);

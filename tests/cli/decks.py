@@ -92,6 +92,10 @@ def bathed(keys):
     return changed("[[particles]]", f"[[bath]]\n{keys}\n[[particles]]")
 
 
+def stepped(keys, method="edda"):
+    return changed('"cdda"', f'"{method}"', changed("[[particles]]", f"[[step]]\n{keys}\n[[particles]]"))
+
+
 def rough(keys, of_particles=""):
     """GOOD with a contact between all, at line 9, and more keys of the particles."""
     return changed("mass = 1.0", f"mass = 1.0\n{of_particles}",

@@ -3,7 +3,7 @@
 
 import pytest
 
-from decks import FLUID, GOOD, bathed, carom, changed, lennard_jones, rough, table, touching, validate, walled
+from decks import FLUID, GOOD, bathed, carom, changed, lennard_jones, rough, stepped, table, touching, validate, walled
 from runs import needs_carom
 
 pytestmark = needs_carom
@@ -167,6 +167,24 @@ DECK_ERRORS = {
     "two baths": (
         bathed('type = "andersen"\ntemperature = 1.0\nrate = 1.0\n[[bath]]\ntype = "rescaling"\ntemperature = 1.0\nrate = 1.0'),
         13, ["a second [[bath]]", "give one"]),
+    "bath without friction": (
+        bathed('type = "langevin"\ntemperature = 1.0'), 9, ["a bath of type langevin needs 'friction'", "add it"]),
+    "bath with a rate instead of friction": (
+        bathed('type = "langevin"\ntemperature = 1.0\nrate = 1.0\nfriction = 1.0'), 9, ["has no 'rate'", "give 'friction'"]),
+    "bath with too many frictions": (
+        bathed('type = "langevin"\ntemperature = 1.0\nfriction = [1.0, 2.0]'), 12, ["'friction' has 2 numbers for 1 species"]),
+    "step of no pairs": (stepped("range = 1.5\ndepth = 1.0"), 9, ["a step names no pairs", "give 'between'"]),
+    "step within the core": (
+        stepped('between = ["*", "*"]\nrange = 0.9\ndepth = 1.0'), 9, ["range 0.9 is not above the contact distance", "a larger range"]),
+    "steps out of order": (
+        stepped('between = ["*", "*"]\nrange = [1.5, 1.2]\ndepth = [1.0, 2.0]'), 9, ["range 1.2 is not above the range 1.5", "ascending"]),
+    "step of an infinite depth": (
+        stepped('between = ["*", "*"]\nrange = 1.5\ndepth = inf'), 12, ["'depth'", "finite"]),
+    "step of an unknown species": (
+        stepped('between = ["*", "ion"]\nrange = 1.5\ndepth = 1.0'), 9, ["'ion' is no species", "give one of"]),
+    "tether between species": (stepped('between = ["*", "*"]\ntether = 1.5'), 9, ["'tether' joins listed pairs", "'pairs' or 'chain'"]),
+    "steps with cva": (
+        stepped('between = ["*", "*"]\nrange = 1.5\ndepth = 1.0', "cva"), 9, ["'cva' does not know steps", "free-flight, edda"]),
     "wall that is shaken without a frequency": (
         walled('name = "y+"\nvelocity = {amplitude = 1}'), 11, ["'velocity' has no 'frequency'", "positive number"]),
     "wall with a frequency of 0": (
@@ -288,6 +306,12 @@ IMPOSSIBLE_STATES = {
     "lattice too dense": (
         changed("box = [6.0, 6.0, 6.0]", "box = [3.6, 3.6, 3.6]", FLUID),
         ["pairs of spheres overlap", "contact distance 1"]),
+    "tether that is too short": (
+        stepped("pairs = [[0, 1]]\ntether = 2.0"), ["particles 0 and 1 start at a distance of 3", "their tether is 2 long", "a longer tether"]),
+    "tether that is no longer than the contact distance": (
+        stepped("pairs = [[0, 1]]\ntether = 0.8"), ["not above their contact distance 1"]),
+    "step at a length within the core": (
+        stepped('between = ["*", "*"]\nrange = 0.9\ndepth = 1.0\nunit = "length"'), ["the step at the distance 0.9", "contact distance 1"]),
     "outside a wall": (
         changed("[[2.0, 5.0]", "[[0.25, 5.0]"),
         ["1 sphere is not inside the walls", "particle 0", "0.25 beyond the lower wall of axis 0"]),

@@ -2,6 +2,7 @@
 """`mpirun carom run`: equal files on any number of ranks."""
 
 import filecmp
+import math
 import os
 import pathlib
 import signal
@@ -19,6 +20,15 @@ import compare
 from carom_files import toml_text
 
 pytestmark = needs_carom
+
+
+def chained_positions(count, edge):
+    """Places on a cubic lattice between walls, in an order in which neighbours of the list are neighbours in space."""
+    cells = math.ceil(count**(1 / 3))
+    cells += cells**3 < count
+    rows = [(x, y, z) for x in range(cells) for y in (range(cells) if x % 2 == 0 else reversed(range(cells)))
+            for z in (range(cells) if (x + y) % 2 == 0 else reversed(range(cells)))]
+    return [[(each + 0.5) * edge / cells for each in row] for row in rows[:count]]
 
 
 def differences(one, other):
@@ -76,6 +86,48 @@ def test_every_law_on_ranks_at_all_vector_widths_and_after_a_kill(method, bath, 
         assert energy["max_abs_error"] < 1e-12 * energy["reference"]
     by_place = method in ("free-flight", "psa", "edda")  # the other methods share the forces only
     for ranks in (2, 3, 4) if by_place else (3,):
+        assert mpirun(ranks, command("input.toml", tmp_path / str(ranks), output), cwd=tmp_path).stderr == ""
+        assert differences(plain, tmp_path / str(ranks)) == []
+    for width in WIDTHS[:-1]:
+        run(deck, tmp_path / width, output, env=os.environ | {"CAROM_SIMD": width})
+        assert differences(plain, tmp_path / width) == []
+    run(deck, killed, output, env=signalled(killer, killed, signal.SIGKILL, len(thermo(plain)["time"]) // 2), code=-signal.SIGKILL)
+    go_on(killed, ranks=2)
+    assert differences(plain, killed) == []
+    assert filecmp.cmp(plain / "thermo.csv", killed / "thermo.csv", shallow=False)
+
+
+# Wells, a shoulder and tethered pairs in a mixture, with a Langevin bath and, except in free flight, with charges.
+STEPS = tomllib.loads(SPHERES) | {
+    "title": "steps",
+    "system": {"dimension": 3, "box": [12.0, 12.0, 12.0], "boundary": ["periodic", "wall", "periodic"]},
+    "particles": [{"name": "large", "count": 120, "temperature": 1.0, "radius": 0.5, "charge": 1.0},
+                  {"name": "small", "count": 120, "temperature": 1.0, "radius": 0.4, "mass": 0.5, "charge": -1.0}],
+    "placement": {"type": "random", "seed": 3},
+    "step": [{"between": ["large", "*"], "range": [1.3, 1.6], "depth": [1.0, 0.4]},
+             {"between": ["small", "small"], "range": 1.5, "depth": -0.3},
+             {"pairs": [[2 * k, 2 * k + 1] for k in range(20)], "range": 1.5, "unit": "length", "depth": 0.1, "tether": 1.8}],
+    "bath": [{"type": "langevin", "temperature": [1.0, 2.0], "friction": [0.5, 1.5]}],
+    "run": {"end_time": 2.0},
+    "output": {"directory": "unused", "frame_interval": 0.2, "thermo_interval": 0.05}}
+
+
+@pytest.mark.parametrize("method", ["free-flight", "psa", "edda"])
+def test_steps_on_ranks_at_all_vector_widths_and_after_a_kill(method, killer, tmp_path):
+    charges = [] if method == "free-flight" else [{"type": "coulomb", "form": "damped-shifted", "damping": 0.8, "cutoff": 2.5}]
+    plain, killed = tmp_path / "plain", tmp_path / "killed"
+    position = chained_positions(240, 12.0)
+    tied = STEPS | {"interaction": charges, "placement": {"type": "file", "file": "places.csv"}}
+    (tmp_path / "places.csv").write_text("".join(",".join(map(repr, each)) + "\n" for each in position))
+    deck = write_deck(tmp_path, toml_text(tied))
+    output = ["output.events=true", "output.checkpoint_wall=\"0\"", f"integrator.type={method}",
+              "integrator.step=" + ("0.25" if method == "free-flight" else "0.02")]
+    run(deck, plain, output)
+    found = summary(plain)
+    assert min(found["events"][name] for name in ("entered", "left", "bounced", "sphere_sphere")) > 50 and abs(found["energy"]["heat"]) > 1
+    if method != "psa":
+        assert found["energy"]["max_abs_error"] < 1e-12 * found["energy"]["reference"]
+    for ranks in (2, 3, 4):
         assert mpirun(ranks, command("input.toml", tmp_path / str(ranks), output), cwd=tmp_path).stderr == ""
         assert differences(plain, tmp_path / str(ranks)) == []
     for width in WIDTHS[:-1]:

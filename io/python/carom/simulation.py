@@ -26,7 +26,7 @@ version = _carom.version
 
 
 def describe(name=None):
-    """Describes a force, an integrator, a wall, a contact or a bath, with its parameters, as text. Without a name: lists all names."""
+    """Describes a force, an integrator, a wall, a contact, a step or a bath, with its parameters, as text. Without a name: lists all names."""
     known = {one["name"]: (kind, one) for kind, all in _carom.descriptors().items() for one in all}
     if name is None:
         kinds = {}
@@ -290,20 +290,37 @@ class Simulation:
         given = refuse_masked("add_contact", dict(parameters))
         self._session.set("contact", given | {"between": [name_of("add_contact", one), name_of("add_contact", other)]})
 
-    def add_bath(self, type, temperature, rate, seed=1, ramp_time=None):
+    def add_step(self, *between, **parameters):
+        """Makes the energy of pairs jump at distances: wells and shoulders between two species ("*" stands for all), or, by `pairs` or
+        `chain`, bonds between listed particles.
+
+        Parameters are those of [[step]] in decks, which carom.describe("step") lists.
+
+            sim.add_step("*", "*", range=1.5, depth=1.0)                      # a square well of 1.5 diameters
+            sim.add_step("*", "*", range=[1.2, 1.5], depth=[1.0, 0.5])        # two steps
+            sim.add_step(pairs=[[0, 1], [1, 2]], tether=1.1, core=0.9)        # hard bonds
+        """
+        given = refuse_masked("add_step", dict(parameters))
+        if between:
+            given |= {"between": [name_of("add_step", each) for each in between]}
+        self._session.set("step", given)
+
+    def add_bath(self, type, temperature, rate=None, seed=1, ramp_time=None, friction=None):
         """Couples all particles to a heat bath, in place of an earlier one.
 
         type: "andersen": at random times a particle gets a new velocity from the distribution of Maxwell and Boltzmann;
-        "rescaling": all velocities are scaled by a common random factor, so that the kinetic energy is canonical.
+        "rescaling": all velocities are scaled by a common random factor, so that the kinetic energy is canonical;
+        "langevin": friction and noise at the end of each step or epoch.
         temperature: a number [energy], or [first, last] for a linear ramp. ramp_time: [start, end] of the ramp, before and after which
         the temperature is constant [time]; by default those of the next run(), so that later runs keep the last temperature.
-        rate: kicks of a particle per unit time; for rescaling, 1/relaxation time.
+        rate: kicks of a particle per unit time; for rescaling, 1/relaxation time. friction: for langevin, the rate at which velocities
+        are damped [1/time], or a list with one for each species.
 
             sim.add_bath("andersen", temperature=1.0, rate=0.5)
             sim.run(time=100)
             sim.bath_temperature = 2.0       # the next run() continues the run
         """
-        given = {"type": type, "temperature": temperature, "rate": rate, "seed": seed, "ramp_time": ramp_time}
+        given = {"type": type, "temperature": temperature, "rate": rate, "seed": seed, "ramp_time": ramp_time, "friction": friction}
         self._session.set("bath", refuse_masked("add_bath", given))
 
     def _set_bath_temperature(self, value):
@@ -484,6 +501,7 @@ class Simulation:
     species = property(lambda self: self._session.constant("species"), doc="Indices into species_names, (N,); a view.")
     species_names = property(lambda self: self._session.species, doc="The names of the species.")
     box = property(lambda self: self._table("system").get("box", [1.0] * self._table("system")["dimension"]), doc="Edges of the box [length].")
+    steps = property(lambda self: self._session.tables("step"), doc="The steps of pairs, as dictionaries of their options.")
     contacts = property(lambda self: self._session.tables("contact"), doc="The laws of contacts, as dictionaries of their options.")
     bath = property(lambda self: next(iter(self._session.tables("bath")), None),
                     doc="The heat bath, as a dictionary of its options; None: there is none.")

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Runs with steps of the pair energy: energies, exact motions, orders, tethers, and what is refused.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "engine/base/error.h"
+#include "engine/setup/step_options.h"
+#include "tests/support/experiments.h"
+
+namespace carom::steps_run_test {
+namespace {
+
+template <int D>
+void add(System<D>& system, Parameters given) {
+  add_step<D>(system.box, system.species, system.size(), completed("step", step_parameters(), std::move(given)));
+}
+
+std::unique_ptr<System<3>> square_well(double packing_fraction, bool charged = false) {
+  auto system = test::hard_spheres<3>(4, packing_fraction);
+  add(*system, {{"between", std::vector<std::string>{"*", "*"}}, {"range", 1.5}, {"depth", 1.0}});
+  if (charged)
+    add_interaction(*system, "yukawa",
+                    {{"amplitude", 5.0}, {"kappa", 2.0}, {"cutoff", 2.0}, {"cut", std::string("force-shifted")}});
+  return system;
+}
+
+/// The energy is kept to rounding by the exact methods, and V is the number of pairs in the well.
+TEST(Steps, TheLedgerOfASquareWellFluidCloses) {
+  for (const std::string method : {"free-flight", "edda", "psa"}) {
+    const bool charged = method != "free-flight";
+    auto system = square_well(0.2, charged);
+    const std::size_t n = system->size();
+    auto run = test::make_run<3>(std::move(system), method, {.step = 0.01, .end_time = 2.0, .thermo_interval = 0.1});
+    struct Energies : Observer<3> {
+      void thermo(const Snapshot<3>& shot) override {
+        EXPECT_EQ(shot.step_energy, -shot.bonds * static_cast<double>(shot.particles->size()));
+        last = shot;
+        if (first_bonds < 0) first_bonds = shot.bonds;
+      }
+      Snapshot<3> last;
+      double first_bonds = -1;
+    } energies;
+    run->add(energies);
+    run->run();
+    const Statistics& s = run->statistics();
+    const StepTally& steps = s.counters.steps;
+    EXPECT_LT(s.max_energy_error, (method == "psa" ? 1e-2 : 1e-14) * s.energy_reference) << method;
+    EXPECT_LT(*s.max_momentum_error, 1e-11) << method;
+    EXPECT_GT(std::min({steps.entered, steps.left, steps.bounced, s.counters.sphere_sphere}), 500U) << method;
+    const double gained = static_cast<double>(steps.entered) - static_cast<double>(steps.left);
+    EXPECT_NEAR((energies.last.bonds - energies.first_bonds) * static_cast<double>(n), gained, 1e-6) << method;
+    EXPECT_EQ(steps.stored.value(), -gained) << method;
+    EXPECT_LT(s.counters.max_overlap, 1e-11) << method;
+  }
+}
+
+/// A pair that flies head-on into a well of depth ε, collides and leaves: each crossing changes the relative speed u to
+/// √(u² ± 4ε) for spheres of mass 1.
+TEST(Steps, APairPassesAWellAsTheFormulaSays) {
+  constexpr double kDepth = 0.3, kSpeed = 0.5;  // of each sphere
+  for (const std::string method : {"free-flight", "psa", "edda"}) {
+    auto system = test::make_system<2>({20, 20}, Boundary::open, {{8, 10}, {12, 10}}, {{kSpeed, 0}, {-kSpeed, 0}});
+    add(*system, {{"between", std::vector<std::string>{"*", "*"}}, {"range", 2.0}, {"depth", kDepth}});
+    const double inside = std::sqrt(4 * kSpeed * kSpeed + 4 * kDepth);
+    const double there = 2 / (2 * kSpeed), within = 1 / inside, end = there + 2 * within + 1;
+    const auto run = test::run_until<2>(std::move(system), method, 0.01, end);
+    const auto& p = run->system().particles;
+    EXPECT_NEAR(p.x[1][0] - p.x[0][0], 2 + 2 * kSpeed, 1e-12) << method;
+    EXPECT_NEAR(p.v[0][0], -kSpeed, 1e-14) << method;
+    const ContactTally& tally = run->statistics().counters;
+    EXPECT_EQ(tally.steps.entered, 1U);
+    EXPECT_EQ(tally.steps.left, 1U);
+    EXPECT_EQ(tally.sphere_sphere, 1U);
+  }
+}
+
+/// The order of edda through crossings and bounces of a pair in a well, with a trap.
+TEST(Steps, EddaIsOfSecondOrder) {
+  const auto end_of = [](double h) {
+    auto system = test::make_system<2>({20, 20}, Boundary::open, {{8.6, 10}, {11.5, 10.3}}, {{0.4, 0.1}, {-0.6, 0}});
+    add(*system, {{"between", std::vector<std::string>{"*", "*"}}, {"range", 1.8}, {"depth", 0.15}});
+    add_interaction(*system, "harmonic-trap", {{"stiffness", 0.4}, {"centre", std::vector<double>{10, 10}}});
+    const auto run = test::run_until<2>(std::move(system), "edda", h, 6.0);
+    EXPECT_GT(run->statistics().counters.steps.events(), 3U);
+    return run->system().particles.x;
+  };
+  const auto exact = end_of(1.0 / 2048);
+  std::vector<double> h, error;
+  for (const double step : {1.0 / 16, 1.0 / 32, 1.0 / 64, 1.0 / 128}) {
+    h.push_back(step);
+    error.push_back(test::largest_difference(end_of(step), exact));
+  }
+  EXPECT_NEAR(test::fitted_order(h, error), 2, 0.2);
+}
+
+/// No bond leaves its limits, in frames of all methods, and a chain in free flight has the bits of one on two ranks.
+TEST(Steps, BondsStayWithinTheirLimits) {
+  for (const std::string method : {"free-flight", "psa", "edda"}) {
+    std::vector<Vec<3>> x, v;
+    for (int i = 0; i < 10; ++i) {
+      x.push_back({1.0 + i, 5, 5});
+      v.push_back({std::sin(3.0 * i), std::cos(5.0 * i), std::sin(7.0 * i)});
+    }
+    auto system = test::make_system<3>({12, 12, 12}, Boundary::periodic, x, v, std::vector<double>(10, 0.45));
+    add(*system, {{"chain", true}, {"tether", 1.1}, {"core", 0.95}});
+    auto run = test::make_run<3>(std::move(system), method, {.step = 0.01, .end_time = 20, .frame_interval = 0.1});
+    struct Lengths : Observer<3> {
+      explicit Lengths(const Box<3>& of) : box(of) {}
+      void frame(const Snapshot<3>& shot) override {
+        for (Id i = 1; i < shot.particles->size(); ++i) {
+          const Vec<3> d = shot.particles->x[i] - shot.particles->x[i - 1];
+          const double length = (d + box.shift(box.nearest_image(d))).norm();
+          shortest = std::min(shortest, length);
+          longest = std::max(longest, length);
+        }
+      }
+      const Box<3>& box;
+      double shortest = 2, longest = 0;
+    } lengths(run->system().box);
+    run->add(lengths);
+    run->run();
+    EXPECT_GT(lengths.shortest, 0.95 - 1e-12) << method;
+    EXPECT_LT(lengths.shortest, 0.952) << method;
+    EXPECT_LT(lengths.longest, 1.1 + 1e-12) << method;
+    EXPECT_GT(lengths.longest, 1.098) << method;
+    EXPECT_GT(run->statistics().counters.steps.bounced, 300U) << method;
+  }
+}
+
+/// A tether with restitution loses what its law says.
+TEST(Steps, ATetherThatLosesEnergyBooksIt) {
+  auto system = test::make_system<2>({20, 20}, Boundary::open, {{8, 10}, {9.5, 10}}, {{-1, 0}, {1, 0}});
+  test::set_law(*system, {{"restitution", 0.5}});
+  add(*system, {{"pairs", PairList{{0, 1}}}, {"tether", 2.0}});
+  const auto run = test::run_until<2>(std::move(system), "free-flight", 0.1, 0.5);
+  EXPECT_NEAR(run->statistics().counters.dissipated.value(), 0.75, 1e-15);
+  EXPECT_NEAR(run->system().particles.v[1][0], -0.5, 1e-15);
+  EXPECT_LT(run->statistics().max_energy_error, 1e-15);
+}
+
+std::string refusal(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "nothing is refused";
+}
+
+TEST(Steps, WhatCannotBeIsRefused) {
+  const std::vector<std::string> all = {"*", "*"};
+  const auto given = [](Parameters parameters) {
+    return refusal([&] {
+      auto system = square_well(0.2);
+      system->box.steps = {};
+      add(*system, parameters);
+      Simulation<3>(std::move(system), "free-flight", {{"step", 0.1}}, {.end_time = 1}).run();
+    });
+  };
+  for (const auto& [parameters, words] : std::vector<std::pair<Parameters, std::string>>{
+           {{{"range", 1.5}, {"depth", 1.0}}, "names no pairs"},
+           {{{"between", all}, {"range", 0.9}, {"depth", 1.0}}, "not above the contact distance"},
+           {{{"between", all}, {"range", 0.9}, {"depth", 1.0}, {"unit", std::string("length")}},
+            "not above their contact"},
+           {{{"between", all}, {"range", std::vector<double>{1.5, 1.2}}, {"depth", std::vector<double>{1, 2}}},
+            "not above the range 1.5"},
+           {{{"between", all}, {"range", 1.5}}, "give a depth for each range"},
+           {{{"between", all}, {"range", 1.5}, {"depth", 0.0}}, "does not jump"},
+           {{{"between", all}, {"tether", 2.0}}, "joins listed pairs"},
+           {{{"between", all}}, "neither 'range' nor"},
+           {{{"between", std::vector<std::string>{"*", "b"}}, {"range", 1.5}, {"depth", 1.0}}, "'b' is no species"},
+           {{{"pairs", PairList{{0, 1}}}, {"tether", 0.5}, {"core", 0.6}}, "not above the core"},
+           {{{"pairs", PairList{{0, 1}}}, {"tether", 0.9}}, "their contact distance"},
+           {{{"pairs", PairList{{0, 200}}}, {"tether", 1.2}}, "start at a distance of"},
+           {{{"pairs", PairList{{0, 1000}}}, {"tether", 1.2}}, "names particle 1000"},
+           {{{"between", all}, {"range", 9.0}, {"depth", 1.0}}, "enlarge the box"}})
+    EXPECT_NE(given(parameters).find(words), std::string::npos) << words << ": " << given(parameters);
+  EXPECT_NE(refusal([] {
+              test::make_run<3>(square_well(0.2), "cva", {.step = 0.01, .end_time = 0.1})->run();
+            }).find("take one of: "),
+            std::string::npos);
+}
+
+/// A Langevin bath moves free spheres as the chain v → c v + noise: the mean squared displacement after n epochs of
+/// length h is, for each axis, h² kT/m [n (1 + c)/(1 − c) − 2 c (1 − cⁿ)/(1 − c)²].
+TEST(Langevin, FreeSpheresDiffuse) {
+  constexpr double kFriction = 2, kStep = 0.1, kTemperature = 1;
+  constexpr int kEpochs = 100;
+  auto system = test::hard_spheres<3>(8, 1e-7);
+  const std::vector<Vec<3>> start = system->particles.x;
+  const double edge = system->box.edges[0];
+  system->box.bath = {.type = Bath::Type::langevin,
+                      .temperature = kTemperature,
+                      .last_temperature = kTemperature,
+                      .friction = {kFriction}};
+  const auto run = test::run_steps<3>(std::move(system), "free-flight", kStep, kEpochs);
+  const auto& p = run->system().particles;
+  double squared = 0;
+  for (Id i = 0; i < p.size(); ++i)
+    for (int k = 0; k < 3; ++k) squared += std::pow(p.x[i][k] + p.image[i][k] * edge - start[i][k], 2);
+  const double freedoms = 3 * static_cast<double>(p.size()), c = std::exp(-kFriction * kStep);
+  const double expected = kStep * kStep * kTemperature *
+                          (kEpochs * (1 + c) / (1 - c) - 2 * c * (1 - std::pow(c, kEpochs)) / ((1 - c) * (1 - c)));
+  EXPECT_NEAR(squared / freedoms, expected, 4 * expected * std::sqrt(2 / freedoms));
+}
+
+/// Each species has its own friction: a mean velocity decays as exp(−γ t).
+TEST(Langevin, EachSpeciesHasItsFriction) {
+  auto system = test::make_system<2>({9, 9}, Boundary::periodic, {{2, 2}, {7, 7}}, {{1000, 0}, {0, 1000}});
+  system->species = {"slow", "fast"};
+  system->particles.species = {0, 1};
+  system->box.bath = {.type = Bath::Type::langevin, .temperature = 1e-9, .last_temperature = 1e-9, .friction = {1, 3}};
+  const auto run = test::run_steps<2>(std::move(system), "verlet", 0.25, 4);
+  EXPECT_NEAR(run->system().particles.v[0][0], 1000 * std::exp(-1.0), 1e-3);
+  EXPECT_NEAR(run->system().particles.v[1][1], 1000 * std::exp(-3.0), 1e-3);
+}
+
+}  // namespace
+}  // namespace carom::steps_run_test
