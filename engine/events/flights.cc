@@ -140,7 +140,7 @@ double Flights<D>::pair_contact(Slot i, const Record<D>& a, Slot j, const Record
   d += shift;
   const double radii = radius(i) + radius(j), sigma = grown(radii, now), rate = radii * growth_;
   if (const PairSteps* const steps = steps_of(a, b)) [[unlikely]]
-    return now + next_step_time<D>(*steps, d, v, sigma, gap_tolerance_(sigma),
+    return now + next_step_time<D>(*steps, d, v, sigma, side_tolerance(just_met(a, b), sigma, gap_tolerance_(0)),
                                    [&] { return approach_slack(sigma, a.v.norm(), b.v.norm()); });
   const bool apart = d.squaredNorm() > sigma * sigma;
   const double slack = apart ? 0 : approach_slack(sigma, a.v.norm(), b.v.norm() + rate);
@@ -224,8 +224,7 @@ EventResult<D> Flights<D>::meet_step(const StepSurface& step, Slot i, Record<D>&
                                      const Vec<D>& d, std::uint32_t generation) const {
   const Vec<D> v = a.v - b.v;
   const double sigma = contact_distance(i, j), inverse_mass = 1 / mass(i) + 1 / mass(j);
-  const double e = tether_restitution<D>(laws(), d, v, a.species, b.species, inverse_mass);
-  const StepImpulse met = step_impulse<D>(step, d, v, inverse_mass, e);
+  const StepImpulse met = step_impulse<D>(step, d, v, inverse_mass);
   const Vec<D> impulse = met.factor * d;
   a.v += impulse / mass(i);
   b.v -= impulse / mass(j);
@@ -233,7 +232,7 @@ EventResult<D> Flights<D>::meet_step(const StepSurface& step, Slot i, Record<D>&
   const double range = step.distance(sigma);
   return {d,
           impulse,
-          {.virial = d.dot(impulse), .dissipated = met.dissipated, .stored = met.stored, .event = met.event},
+          {.virial = d.dot(impulse), .stored = met.stored, .event = met.event},
           step.tether() ? d.norm() / range - 1 : 0,
           range};
 }

@@ -107,6 +107,10 @@ class Flights {
   // The functions above for records other than the present ones. Internal states change; they are not read if spheres
   // have none.
   double pair_contact(Slot i, const Record<D>& a, Slot j, const Record<D>& b, const Vec<D>& shift) const;
+  /// Whether the last event of both was one with each other, perhaps.
+  static bool just_met(const Record<D>& a, const Record<D>& b) {
+    return a.t == b.t && a.generation == b.generation && a.t != 0;
+  }
   /// The steps of two spheres; null: they have none.
   const PairSteps* steps_of(const Record<D>& a, const Record<D>& b) const {
     return has_steps_ ? box_.steps.find(a.id, a.species, b.id, b.species) : nullptr;

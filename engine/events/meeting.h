@@ -100,15 +100,6 @@ PairImpulse<D> pair_impulse(const ContactLaws& laws, const Vec<D>& d, const Vec<
   return impulse;
 }
 
-/// The coefficient of restitution with which a tether pulls a pair back: that of the pair's contacts; slow pulls are
-/// elastic.
-template <int D>
-double tether_restitution(const ContactLaws& laws, const Vec<D>& d, const Vec<D>& v, std::uint16_t one,
-                          std::uint16_t other, double inverse_mass) {
-  if (laws.elastic()) return 1;
-  return laws.of_pair(one, other).restitution_at({std::abs(d.dot(v)) / d.norm(), inverse_mass}, laws.thermal_speed, 1);
-}
-
 /// The velocity of a sphere after a contact with a wall, and what was exchanged.
 template <int D>
 struct WallImpulse {

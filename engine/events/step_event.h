@@ -2,11 +2,12 @@
 #pragma once
 // When a pair of spheres reaches one of its steps (laws/steps.h) or its core, and what happens there.
 //
-// Nothing is stored about the side of a step on which a pair is. It follows from the distance; within the gap tolerance
-// of a step it follows from the direction of the relative motion, because after an event a pair moves away from the
-// step into the side on which it is. A third sphere that turns this motion while the pair is within the tolerance
-// makes the pair change sides unseen. Monitor compares the energy of the steps with the ledger, so that this ends the
-// run.
+// Nothing is stored about the side of a step on which a pair is. It follows from the distance. At a step, within a
+// tolerance, it follows from the direction of the relative motion, because after an event a pair moves away from the
+// step into the side on which it is. For a pair that has just met, the tolerance is wide (`kJustMet`), since the place
+// of an event is rounded more if its time is long; for others it is the rounding of positions. So a pair changes sides
+// unseen only if a third sphere turns it, or a slab ends, while it is within rounding of a step. Monitor compares the
+// energy of the steps with the ledger and ends the run then.
 
 #include "engine/events/contact.h"
 #include "engine/laws/contact_log.h"
@@ -21,16 +22,26 @@ struct PairMotion {
   double b = d.dot(v), distance = d.norm();
 };
 
-/// The number of steps outside of which a pair is. `tolerance` and `slack` as in contact.h: a pair that neither
-/// approaches nor recedes is outside, because on a tangent it recedes. A tether is never passed; images beyond it are
-/// not tethered.
+/// A pair that has just met is at the step that is nearest, relative to the distance: far more than the rounding of a
+/// place, and a tenth of the least separation of steps (setup/step_options.cc).
+inline constexpr double kJustMet = 1e-7;
+
+/// Within this distance of a step the direction of the motion decides on which side a pair is. `rounding`: of positions
+/// (GapTolerance at 0).
+inline double side_tolerance(bool just_met, double sigma, double rounding) {
+  return just_met ? kJustMet * sigma : rounding;
+}
+
+/// The number of steps outside of which a pair is. `slack` as in contact.h: a pair that neither approaches nor recedes
+/// is outside, because on a tangent it recedes. A tether is never passed; images beyond it are not tethered.
 template <int D>
 std::size_t steps_passed(const PairSteps& steps, const PairMotion<D>& motion, double sigma, double tolerance,
                          double slack) {
   std::size_t passed = 0;
   for (const StepSurface& each : steps.surfaces) {
     const double gap = motion.distance - each.distance(sigma);
-    if (gap < -tolerance || (gap <= tolerance && (each.tether() || motion.b < -slack))) break;
+    if (gap < -tolerance || (gap <= tolerance && motion.b < -slack)) break;
+    if (each.tether() && gap <= kJustMet * motion.distance) break;
     ++passed;
   }
   return passed;
@@ -111,20 +122,21 @@ template <int D, class Slack>
   return b > 0 ? (outside * outside - squared) / (b + root) : (root - b) / v2;
 }
 
-/// The same for parabolic relative motion, in [0, time_left).
+/// The same for parabolic relative motion, in [0, time_left). `core_tolerance`: the gap at which cores touch.
 template <int D>
 double next_step_time(const PairSteps& steps, const PairMotion<D>& motion, const Vec<D>& a, double sigma,
-                      double time_left, double tolerance, double slack) {
+                      double time_left, double tolerance, double core_tolerance, double slack) {
   const std::size_t passed = steps_passed(steps, motion, sigma, tolerance, slack), number = steps.surfaces.size();
   const double inside = passed == 0 ? steps.core_distance(sigma) : steps.surfaces[passed - 1].distance(sigma);
   const double outside = passed == number ? kNever : steps.surfaces[passed].distance(sigma);
   const double path = time_left * (motion.v.norm() + 0.5 * time_left * a.norm()) + tolerance;
   if (motion.distance - path > inside && motion.distance + path < outside) return kNever;
-  const auto touching = [&](double range) { return std::abs(motion.distance - range) <= tolerance; };
-  const bool overlapping = motion.distance <= inside + tolerance;
-  const double entering = contact_time<D>(motion.d, motion.v, a, inside, time_left, overlapping, slack);
+  const bool at_core = passed == 0 && motion.distance <= inside + core_tolerance;
+  const bool at_inside = passed > 0 && motion.distance <= inside + tolerance;
+  const double entering = contact_time<D>(motion.d, motion.v, a, inside, time_left, at_core || at_inside, slack);
   if (outside == kNever) return entering;
-  return std::min(entering, leaving_time(motion, a, outside, time_left, touching(outside), slack));
+  const bool at_outside = motion.distance >= outside - tolerance;
+  return std::min(entering, leaving_time(motion, a, outside, time_left, at_outside, slack));
 }
 
 /// The step that a pair reaches at this distance; null: it reaches its core.
@@ -139,24 +151,19 @@ inline const StepSurface* step_at(const PairSteps& steps, double distance, doubl
 /// What happens to a pair at a step: the impulse is factor·d on the first sphere.
 struct StepImpulse {
   double factor = 0;
-  double stored = 0;      ///< the energy that goes from the motion into the potential [energy]
-  double dissipated = 0;  ///< the energy that a tether takes [energy]
+  double stored = 0;  ///< the energy that goes from the motion into the potential [energy]
   PairEvent event = PairEvent::bounce;
 };
 
 /// A pair reaches a step. It crosses if b² > 2 c d² (1/m_i + 1/m_j), where c is the energy that it must climb, and
 /// then b² decreases by this number; otherwise b changes its sign (Alder, Wainwright, J. Chem. Phys. 31 (1959) 459).
 /// The factor has no cancellation for small c, and d is not normalised, so that the kinetic energy changes by −c to
-/// rounding. `restitution`: of tethers.
+/// rounding.
 template <int D>
-StepImpulse step_impulse(const StepSurface& step, const Vec<D>& d, const Vec<D>& v, double inverse_mass,
-                         double restitution) {
+StepImpulse step_impulse(const StepSurface& step, const Vec<D>& d, const Vec<D>& v, double inverse_mass) {
   const double b = d.dot(v), weight = d.squaredNorm() * inverse_mass;
-  if (step.tether())
-    return {.factor = -(1 + restitution) * b / weight,
-            .dissipated = 0.5 * (1 - restitution * restitution) * b * b / weight};
   const double climb = b > 0 ? step.climb : -step.climb, left = b * b - 2 * climb * weight;
-  if (!(left > 0)) return {.factor = -2 * b / weight};
+  if (step.tether() || !(left > 0)) return {.factor = -2 * b / weight};
   return {.factor = -2 * climb / (b + std::copysign(std::sqrt(left), b)),
           .stored = climb,
           .event = b > 0 ? PairEvent::leave : PairEvent::enter};

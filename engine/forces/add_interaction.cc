@@ -12,13 +12,13 @@ void add_interaction(System<D>& system, std::string_view type, Parameters given)
 
 template <int D>
 void add_interaction(System<D>& system, const InteractionInfo& info, Parameters given) {
-  system.interactions.push_back(
-      info.make<D>(completed(info.name, info.parameters, std::move(given)), {.box = system.box,
-                                                                             .particles = system.particles,
-                                                                             .species = system.species,
-                                                                             .total = system.size(),
-                                                                             .ranks = system.decomposition.others(),
-                                                                             .bonds = bonds_of(system.interactions)}));
+  system.interactions.push_back(info.make<D>(completed(info.name, info.parameters, std::move(given)),
+                                             {.box = system.box,
+                                              .particles = system.particles,
+                                              .species = system.species,
+                                              .total = system.size(),
+                                              .ranks = system.decomposition.others(),
+                                              .bonds = bonds_of(system.interactions, system.box.steps)}));
 }
 
 template void add_interaction(System<2>&, std::string_view, Parameters);

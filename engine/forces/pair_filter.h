@@ -13,6 +13,7 @@
 #include "engine/base/parameters.h"
 #include "engine/base/particles.h"
 #include "engine/forces/simd/pair_kernels.h"
+#include "engine/laws/steps.h"
 
 namespace carom {
 
@@ -49,11 +50,12 @@ class BondTable {
   std::vector<Id> partners_;
 };
 
-/// The bonds of these terms; null if none has bonds.
+/// The bonds of these terms and of steps; null if none has bonds.
 template <class Terms>
-std::shared_ptr<const BondTable> bonds_of(const Terms& terms) {
+std::shared_ptr<const BondTable> bonds_of(const Terms& terms, const Steps& steps) {
   PairList all;
-  bool any = false;
+  bool any = steps.bonds() > 0;
+  steps.for_each_bond([&](Id i, Id j, const PairSteps&) { all.push_back({i, j}); });
   for (const auto& term : terms)
     if (const PairList* bonds = term ? term->bonds() : nullptr) {
       all.insert(all.end(), bonds->begin(), bonds->end());

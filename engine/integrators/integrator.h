@@ -99,8 +99,8 @@ struct IntegratorInfo {
   /// some particles are fixed.
   template <int D>
   std::string refusal(const Interaction<D>& term, bool fixed) const;
-  /// As above, for these steps.
-  std::string refusal(const Steps& steps) const;
+  /// Why the method cannot run with steps of the pair energy, in the same form; empty if it can.
+  std::string refusal_of_steps() const;
 
   template <int D>
   std::unique_ptr<Integrator<D>> make(const Parameters& p) const {

@@ -26,8 +26,8 @@ std::string IntegratorInfo::refusal(const Interaction<D>& term, bool fixed) cons
          "field "
          "out, let all particles move, or take psa, edda or their relatives";
 }
-std::string IntegratorInfo::refusal(const Steps& given) const {
-  if (given.empty() || steps) return "";
+std::string IntegratorInfo::refusal_of_steps() const {
+  if (steps) return "";
   std::string able;
   for (const IntegratorInfo& each : integrators())
     if (each.steps) able.append(able.empty() ? "" : ", ").append(each.name);

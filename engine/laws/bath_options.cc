@@ -49,6 +49,8 @@ Bath bath_of(const Parameters& given, std::uint64_t seed) {
   if (const auto* one = given.find<double>("friction")) bath.friction = {*one};
   if (const auto* all = given.find<std::vector<double>>("friction")) bath.friction = *all;
   if (const auto* own = given.find<std::int64_t>("seed")) bath.seed = static_cast<std::uint64_t>(*own);
+  if (bath.damps() && bath.friction.empty())
+    throw Error(Failure::deck, "'friction' is an empty list; give one number, or one for each species");
   if (const auto* constant = given.find<double>("temperature")) bath.set_temperature(*constant);
   if (const auto* ramp = given.find<std::vector<double>>("temperature")) {
     if (ramp->size() != 2)

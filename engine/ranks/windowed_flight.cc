@@ -77,13 +77,14 @@ void WindowedFlight<D>::reload() {
   });
 }
 
-/// The key of the n-th contact of a window over all ranks, or of the n-th one of pairs, n from 1. Collective.
+/// The key of the n-th contact of a window over all ranks, or of the n-th collision of two cores, n from 1. Collective.
 template <int D>
 EventKey<D> WindowedFlight<D>::key_of_contact(std::uint64_t number, bool pairs) {
   std::vector<EventKey<D>> mine;
   subdomain_.for_each_contact([&](Slot i, std::size_t k) {
     const EventKey<D> key = subdomain_.paths().node(i, k).key;
-    if (!pairs || key.kind == EventKind::pair) mine.push_back(key);
+    const auto core = [&] { return subdomain_.paths().contact_of(i, k).exchange.event == PairEvent::core; };
+    if (!pairs || (key.kind == EventKind::pair && (box_.steps.empty() || core()))) mine.push_back(key);
   });
   auto keys = gather_values<EventKey<D>>(ranks_, mine);
   std::ranges::nth_element(keys, keys.begin() + static_cast<std::ptrdiff_t>(number - 1));
@@ -133,7 +134,8 @@ double WindowedFlight<D>::run(double end, const Report& report) {
       last_tally = {};
       collisions += vote.collisions_before;
       events_ += vote.events_before;
-      if (last_length > 0) length_.note(std::exchange(last_length, 0), vote.collisions_before);
+      if (last_length > 0)
+        length_.note(std::exchange(last_length, 0), box_.steps.empty() ? vote.collisions_before : vote.events_before);
       valid = !vote.no_room && vote.reached == stop && !length_.too_fast(vote.speed, stop - now_);
       return valid && vote.changed;
     });

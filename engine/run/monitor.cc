@@ -172,8 +172,9 @@ void Monitor<D>::check_steps(const Waiting& slab, const StepAccount& counted) {
                     " by events; another sphere has turned the pair within rounding of the step, which is rare: "
                     "continue from the last checkpoint with another integrator.step, or start with another seed");
   if (counted.tethered != steps.tethers())
-    throw Error(Failure::numerical, std::to_string(steps.tethers() - counted.tethered) +
-                                        " tethers have lost their pairs" + when + "; use a smaller integrator.step");
+    throw Error(Failure::numerical, "tethers have lost their pairs (" +
+                                        std::to_string(steps.tethers() - counted.tethered) + ")" + when +
+                                        "; use a smaller integrator.step");
 }
 
 /// Names the fastest particle, for messages. Collective.
@@ -323,8 +324,8 @@ void Monitor<D>::take(const Waiting& slab, const Sums& sums) {
   if (s.max_shadow_energy_error)
     s.max_shadow_energy_error =
         std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow + slab.tally.drained() - account_.first_shadow));
-  guard(energy, magnitude);
   check_steps(slab, sums.motion.steps);
+  guard(energy, magnitude);
   if (s.max_momentum_error)
     s.max_momentum_error = std::max(*s.max_momentum_error,
                                     (Vec<D>(shot_.momentum.data()) - Vec<D>(account_.first_momentum.data())).norm());

@@ -85,7 +85,15 @@ void check_rest_speeds(const System<D>& system) {
 /// Throws if the method refuses steps or a force; fixed particles matter from count_moving() on.
 template <int D>
 void check_forces(const System<D>& system, const IntegratorInfo& info) {
-  if (const std::string no = info.refusal(system.box.steps); !no.empty()) throw Error(Failure::deck, no);
+  if (const std::string no = info.refusal_of_steps(); !no.empty() && !system.box.steps.empty())
+    throw Error(Failure::deck, no);
+  if (info.stepping && !system.box.steps.empty() && !system.box.contacts.elastic())
+    throw Error(Failure::deck, std::string(steps_and_laws));
+  if (const Bath& bath = system.box.bath;
+      bath.damps() && bath.friction.size() != 1 && bath.friction.size() != system.species.size())
+    throw Error(Failure::deck, "the bath has " + std::to_string(bath.friction.size()) + " frictions for " +
+                                   std::to_string(system.species.size()) +
+                                   " species; give one for all, or one for each");
   for (const auto& term : system.interactions)
     if (const std::string no = info.refusal(*term, system.has_fixed()); !no.empty()) throw Error(Failure::deck, no);
 }
@@ -298,14 +306,15 @@ void Simulation<D>::run(const Hooks& hooks) {
                                monitor_->observe(slab.start + offset, copies);
                              },
                          .watch = &watch};
-    const std::uint64_t collisions = s.counters.sphere_sphere, at_walls = s.counters.sphere_wall;
+    const auto met = [&] { return s.counters.sphere_sphere + s.counters.steps.events(); };
+    const std::uint64_t collisions = met(), at_walls = s.counters.sphere_wall;
     if (!fly(slab, report, watch)) {
       if (hooks.left) hooks.left();
       continue;
     }
     show_contacts(slab);
     s.counters.seconds.communicate = system_->decomposition.seconds_waited();
-    const std::uint64_t pairs = s.counters.sphere_sphere - collisions, walls = s.counters.sphere_wall - at_walls;
+    const std::uint64_t pairs = met() - collisions, walls = s.counters.sphere_wall - at_walls;
     if (pairs > 0) quiet_since_ = slab.start + report.reached;
     const double complete = clock_.end_slab(slab, report.reached, pairs, walls, report.boxes, s);
     act_of_bath(slab, complete, report);

@@ -102,7 +102,8 @@ double longest_step(const System<D>& system, const Plan& plan, double strongest)
   if (strongest > 0) longest = std::min(longest, std::sqrt(2 * kOfLength * shortest / strongest));
   longest = std::min({longest, system.box.longest_step(),
                       plan.longest_step > 0 ? plan.longest_step : std::numeric_limits<double>::infinity()});
-  if (bath.type != Bath::Type::none && bath.rate > 0) longest = std::min(longest, kOfRelaxation / bath.rate);
+  if (bath.type != Bath::Type::none && bath.relaxation_rate() > 0)
+    longest = std::min(longest, kOfRelaxation / bath.relaxation_rate());
   return longest;
 }
 

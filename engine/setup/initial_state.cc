@@ -48,13 +48,16 @@ std::string step_problem(const System<D>& system) {
           return "the step at the distance " + short_text(of->surfaces.front().range) + " between '" +
                  system.species[a] + "' and '" + system.species[b] + "' is not above their contact distance " +
                  short_text(contact) + "; give a larger range";
-  const bool bonds = steps.bonds() > 0;
+  double longest = 0;  // bond
+  steps.for_each_bond([&](Id, Id, const PairSteps& of) {
+    longest = std::max(longest, of.farthest(2 * *std::ranges::max_element(radius)));
+  });
   const double farthest = 2 * steps.reach()(*std::ranges::max_element(radius));
   for (int k = 0; k < D; ++k)
-    if (box.periodic(k) && box.edges[k] < (bonds ? 2 : 1) * farthest)
+    if (box.periodic(k) && box.edges[k] < std::max(farthest, 2 * longest))
       return "the periodic box is " + short_text(box.edges[k]) + " long on axis " + std::to_string(k) +
-             ", and a step acts up to a distance of " + short_text(farthest) + "; enlarge the box" +
-             (bonds ? " to at least twice this distance, because a bond spans the nearest image" : "");
+             ", and steps act up to a distance of " + short_text(farthest) + ", bonds up to " + short_text(longest) +
+             "; enlarge the box to the distance of steps and to twice that of bonds, which span the nearest image";
   std::string problem;
   if (!system.decomposition.joined())
     steps.for_each_bond([&](Id i, Id j, const PairSteps& of) {
@@ -66,6 +69,11 @@ std::string step_problem(const System<D>& system) {
       if (!(core < inmost))
         problem = pair + " have a step at the distance " + short_text(inmost) + ", not above their contact distance " +
                   short_text(core) + "; give a larger one, or a smaller 'core'";
+      else if (p.fixed(i) && p.fixed(j))
+        problem = pair + " are fixed and cannot be bonded; leave the pair out";
+      else if (distance < core - box.gap_tolerance()(core))
+        problem = pair + " start at a distance of " + short_text(distance, 10) + ", and their core is " +
+                  short_text(core) + " wide; move them apart, or give a smaller core";
       else if (!of.surfaces.empty() && of.surfaces.back().tether() &&
                distance > of.surfaces.back().range + box.gap_tolerance()(contact))
         problem = pair + " start at a distance of " + short_text(distance, 10) + ", and their tether is " +
@@ -73,8 +81,8 @@ std::string step_problem(const System<D>& system) {
     });
   if (!problem.empty()) return problem;
   if (const std::uint64_t found = system.decomposition.sum(own_steps(system, p)).tethered; found != steps.tethers())
-    return std::to_string(steps.tethers() - found) +
-           " bonded pairs start farther apart than their tether; move them together, or give a longer tether";
+    return "bonded pairs (" + std::to_string(steps.tethers() - found) +
+           ") start farther apart than their tether; move them together, or give a longer tether";
   return "";
 }
 

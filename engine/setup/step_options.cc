@@ -29,9 +29,8 @@ PairSteps steps_of(const Parameters& given, bool listed) {
   if (range.size() != depth.size())
     refuse("'range' has " + std::to_string(range.size()) + " numbers and 'depth' has " + std::to_string(depth.size()),
            "give a depth for each range");
-  double inside = 0;
-  if (const auto* core = given.find<double>("core")) inside = steps.core = *core;
-  if (of_contact) inside = std::max(inside, 1.0);
+  if (const auto* core = given.find<double>("core")) steps.core = *core;
+  double inside = of_contact ? 1 : steps.core;
   for (std::size_t k = 0; k < range.size(); ++k) {
     if (!(range[k] >= (1 + kLeastSeparation) * inside))
       refuse("range " + short_text(range[k]) +

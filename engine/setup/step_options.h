@@ -13,7 +13,8 @@ namespace carom {
 const std::vector<Parameter>& step_parameters();
 
 /// Gives pairs these steps: all pairs of two species, or listed pairs of a system with this many particles. These
-/// parameters are complete. Throws Error(Failure::deck), also if pairs have steps already.
+/// parameters are complete. Steps of two species replace earlier ones of these two. Throws Error(Failure::deck), also
+/// if a pair is bonded twice.
 template <int D>
 void add_step(Box<D>& box, std::span<const std::string> species, std::size_t particles, const Parameters& given);
 

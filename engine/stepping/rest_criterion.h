@@ -94,9 +94,11 @@ class RestCriterion {
   /// For methods that cut the step at each contact: contacts that open more than by rounding are not held.
   void let_open() { lets_open_ = true; }
 
-  /// The sum of the radii, or the radius at a wall.
+  /// The contact distance, or the radius at a wall.
   double distance(const EventKey<D>& key) const {
-    return particles_.radius[key.lo] + (key.kind == EventKind::pair ? particles_.radius[key.hi] : 0.0);
+    if (key.kind != EventKind::pair) return particles_.radius[key.lo];
+    return box_.steps.core_distance(particles_.id_of(key.lo), particles_.id_of(key.hi),
+                                    particles_.radius[key.lo] + particles_.radius[key.hi]);
   }
   /// The reaction of the last piece; 0 if there is none.
   double known_force(const EventKey<D>& key) const;

@@ -99,7 +99,8 @@ void SlabCore<D>::find_near() {
   for (std::uint32_t k = 0; k < pairs_.size(); ++k) {
     const auto& [i, j, image] = pairs_[k];
     const PairSteps* const steps = scan_->steps(i, j);
-    const double contact = scan_->contact_distance(i, j), sigma = steps ? steps->farthest(contact) : contact;
+    const double radii = particles_.radius[i] + particles_.radius[j],
+                 sigma = steps ? steps->farthest(radii) : scan_->contact_distance(i, j);
     const double touching = sigma + scan_->tolerance(sigma);
     const double near = touching + longest_path_of_[i] + longest_path_of_[j];
     const Vec<D> d = x[i] - x[j] + box_.shift(image);
@@ -324,9 +325,11 @@ void SlabCore<D>::predict_pair(Id i, Id j, const Image<D>& image) {
 template <int D>
 double SlabCore<D>::step_time(const PairMotion<D>& motion, const PairSteps& steps, Id i, Id j, double time_left,
                               double slack) const {
-  const double sigma = particles_.radius[i] + particles_.radius[j], tolerance = scan_->tolerance(sigma);
+  const double sigma = particles_.radius[i] + particles_.radius[j];
+  const bool just_met = slot_[i] != 0 && slot_[j] != 0 && start(i) == start(j);
+  const double tolerance = side_tolerance(just_met, sigma, scan_->tolerance(0));
   if (a_.empty()) return next_step_time<D>(steps, motion.d, motion.v, sigma, tolerance, [&] { return slack; });
-  return next_step_time<D>(steps, motion, a_[i] - a_[j], sigma, time_left, tolerance, slack);
+  return next_step_time<D>(steps, motion, a_[i] - a_[j], sigma, time_left, tolerance, scan_->tolerance(sigma), slack);
 }
 
 /// The step at which an event happens; null: it is a contact.
@@ -499,14 +502,11 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     if (const StepSurface* const step = has_steps_ ? step_of(key) : nullptr) {
       if (step->tether() && !(d.dot(v) > 0)) return;
       const double inverse_mass = 1 / particles_.mass[key.lo] + 1 / particles_.mass[key.hi];
-      const auto met = step_impulse<D>(*step, d, v, inverse_mass,
-                                       tether_restitution<D>(box_.contacts, d, v, particles_.species[key.lo],
-                                                             particles_.species[key.hi], inverse_mass));
+      const StepImpulse met = step_impulse<D>(*step, d, v, inverse_mass);
       contact.impulse = met.factor * d;
       lo.v += contact.impulse / particles_.mass[key.lo];
       hi.v -= contact.impulse / particles_.mass[key.hi];
-      contact.exchange = {
-          .virial = d.dot(contact.impulse), .dissipated = met.dissipated, .stored = met.stored, .event = met.event};
+      contact.exchange = {.virial = d.dot(contact.impulse), .stored = met.stored, .event = met.event};
     } else {
       if (!(d.dot(v) < 0)) return;
       const auto impulse = pair_impulse<D>(box_.contacts, d, v, partner(lo), partner(hi));

@@ -199,7 +199,7 @@ void make_interactions(const Deck::Source& source, System<D>& system, bool place
   const auto& all = source.interactions;  // bonds before the terms that leave out bonded pairs
   for (std::size_t n = 0; n < all.size(); ++n)
     if (bonded(all[n])) make(n);
-  context.bonds = bonds_of(terms);
+  context.bonds = bonds_of(terms, system.box.steps);
   if (!context.bonds && std::ranges::any_of(all, bonded)) context.bonds = std::make_shared<BondTable>(PairList());
   for (std::size_t n = 0; n < all.size(); ++n)
     if (!bonded(all[n])) make(n);

@@ -91,11 +91,6 @@ class Interpreter {
       for (ValueTable& step : values_.list("step"))
         if (!step.wrong && !names.empty())
           step.wrong = report(step.at, [&] { add_step(box, names, source_.particles(), step.values); });
-      if (source_.integrator != nullptr && !values_.list("step").empty())
-        report(values_.list("step").front().at, [&] {
-          if (const std::string no = source_.integrator->refusal(box.steps); !no.empty())
-            throw Error(Failure::deck, no);
-        });
       if (source_.edges.size() != dimension_ || walls.empty()) return;
       std::copy_n(source_.edges.begin(), dimension_, box.edges.begin());
       report(walls.back().at, [&] { box.check(Failure::deck); });
@@ -167,6 +162,12 @@ class Interpreter {
       problems_.error(source_.species.front().at, "all particles are fixed, and nothing would move",
                       "let some move: fixed = false");
     if (source_.integrator == nullptr) return;
+    if (const ValueTable* step = values_.find("step"))
+      report(step->at, [&] {
+        if (const std::string no = source_.integrator->refusal_of_steps(); !no.empty()) throw Error(Failure::deck, no);
+        if (source_.integrator->stepping && !values_.list("contact").empty())
+          throw Error(Failure::deck, std::string(steps_and_laws));
+      });
     if (const ValueTable* placement = values_.find("placement")) {
       if (source_.integrator->hard_cores && placement->given("distance"))
         problems_.error(placement->place("distance"), "'distance' is for points, which only 'verlet' has",

@@ -146,6 +146,7 @@ void write_bonds(File& file, const System<D>& system) {
   for (const auto& term : system.interactions)
     if (const PairList* some = term->bonds(); some != nullptr)
       for (const auto& [i, j] : *some) bonds.push_back({std::min(i, j), std::max(i, j)});
+  system.box.steps.for_each_bond([&](Id i, Id j, const PairSteps&) { bonds.push_back({i, j}); });
   if (bonds.empty()) return;
   std::ranges::sort(bonds);
   bonds.erase(std::unique(bonds.begin(), bonds.end()), bonds.end());

@@ -60,7 +60,7 @@ const std::vector<Column<D>>& columns() {
       {"step_length", number, "time", "length of the last step or epoch",  //
        [](S s, int) { return s.step_length; }, "step_length", "step_length"},
       {"bonds", number, "-", "pairs inside the outermost of their steps, for each particle",  //
-       [](S s, int) { return s.bonds; }, "bonds", "bonds"}};
+       [](S s, int) { return s.bonds; }, nullptr, "bonds"}};
   return all;
 }
 template const std::vector<Column<2>>& columns();

@@ -132,6 +132,7 @@ void Session<D>::add_particles(const Columns& columns) {
     all.mass.resize(n), all.radius.resize(n), all.charge.resize(n), all.species.resize(n);
     size_ = n;
   };
+  const Box<D> box = box_;
   try {
     resize(before + added);
     const Particle<D> fallback{.x = Vec<D>::Zero()};
@@ -161,6 +162,7 @@ void Session<D>::add_particles(const Columns& columns) {
   } catch (...) {
     resize(before);
     species_.resize(kinds);
+    system_->box = box_ = box;
     system_->species = species_;
     system_->interactions.clear();
     throw;
@@ -347,6 +349,7 @@ void Session<D>::set_contacts(std::vector<ValueTable> all) {
 template <int D>
 void Session<D>::add_step(Parameters given) {
   if (running_) refuse("a run is going on; add steps before it or after it");
+  if (size_ == 0) refuse("step: there are no particles yet; call add_particles() first");
   auto all = values_.list("step");
   all.push_back(table_of("step", std::move(given)));
   set_pair_steps(std::move(all));

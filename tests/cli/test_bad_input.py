@@ -183,6 +183,9 @@ DECK_ERRORS = {
     "step of an unknown species": (
         stepped('between = ["*", "ion"]\nrange = 1.5\ndepth = 1.0'), 9, ["'ion' is no species", "give one of"]),
     "tether between species": (stepped('between = ["*", "*"]\ntether = 1.5'), 9, ["'tether' joins listed pairs", "'pairs' or 'chain'"]),
+    "steps next to a law of contacts": (
+        stepped('between = ["*", "*"]\nrange = 1.5\ndepth = 1.0\n[[contact]]\nbetween = ["*", "*"]\nrestitution = 0.9'),
+        9, ["lose track of the steps", "take free-flight"]),
     "steps with cva": (
         stepped('between = ["*", "*"]\nrange = 1.5\ndepth = 1.0', "cva"), 9, ["'cva' does not know steps", "free-flight, edda"]),
     "wall that is shaken without a frequency": (
@@ -312,6 +315,8 @@ IMPOSSIBLE_STATES = {
         stepped("pairs = [[0, 1]]\ntether = 0.8"), ["not above their contact distance 1"]),
     "step at a length within the core": (
         stepped('between = ["*", "*"]\nrange = 0.9\ndepth = 1.0\nunit = "length"'), ["the step at the distance 0.9", "contact distance 1"]),
+    "bond that starts within its core": (
+        stepped("pairs = [[0, 1]]\ntether = 5.0\ncore = 4.0"), ["their core is 4 wide", "a smaller core"]),
     "outside a wall": (
         changed("[[2.0, 5.0]", "[[0.25, 5.0]"),
         ["1 sphere is not inside the walls", "particle 0", "0.25 beyond the lower wall of axis 0"]),

@@ -139,6 +139,17 @@ def test_steps_on_ranks_at_all_vector_widths_and_after_a_kill(method, killer, tm
     assert filecmp.cmp(plain / "thermo.csv", killed / "thermo.csv", shallow=False)
 
 
+def test_a_number_of_collisions_next_to_steps(tmp_path):
+    """Events at steps do not count as collisions."""
+    deck = write_deck(tmp_path, toml_text({key: value for key, value in STEPS.items() if key != "step"} |
+                                          {"step": STEPS["step"][:2], "bath": [], "run": {"collisions": 300}}))
+    run(deck, tmp_path / "plain", ["integrator.type=free-flight", "integrator.step=4.0"])
+    assert summary(tmp_path / "plain")["events"]["sphere_sphere"] == 300
+    for ranks in 2, 3:
+        mpirun(ranks, command("input.toml", tmp_path / str(ranks), ["integrator.type=free-flight", "integrator.step=4.0"]), cwd=tmp_path)
+        assert differences(tmp_path / "plain", tmp_path / str(ranks)) == []
+
+
 # Discs that fall on a floor and come to rest there; the large ones are of ice.
 GRAINS = toml_text(tomllib.loads(DISCS) | {
     "title": "grains",

@@ -11,13 +11,14 @@ std::vector<Parameter> with_filter(std::vector<Parameter> own) {
   using enum Parameter::Type;
   own.push_back({"species", text_list, "none", "-",
                  "the names of two species between which the term acts; absent: all particles"});
-  own.push_back({"exclude",
-                 text,
-                 "\"none\"",
-                 "-",
-                 "'bonded': the term does not act between particles that a harmonic-bond joins",
-                 Parameter::Range::any,
-                 {"none", "bonded"}});
+  own.push_back(
+      {"exclude",
+       text,
+       "\"none\"",
+       "-",
+       "'bonded': the term does not act between particles that a harmonic-bond or a [[step]] with a list joins",
+       Parameter::Range::any,
+       {"none", "bonded"}});
   return own;
 }
 
@@ -125,7 +126,7 @@ PairList bonds(std::string_view type, const Parameters& parameters, std::size_t 
   const auto twice = std::ranges::adjacent_find(list);
   if (twice != list.end())
     refuse(type, "pair [" + std::to_string((*twice)[0]) + ", " + std::to_string((*twice)[1]) +
-                     "] is given twice; for a stiffer bond give a larger stiffness");
+                     "] is given twice; leave one of the two out");
   return list;
 }
 
