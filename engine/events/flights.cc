@@ -140,7 +140,8 @@ double Flights<D>::pair_contact(Slot i, const Record<D>& a, Slot j, const Record
   d += shift;
   const double radii = radius(i) + radius(j), sigma = grown(radii, now), rate = radii * growth_;
   if (const PairSteps* const steps = steps_of(a, b)) [[unlikely]]
-    return now + next_step_time<D>(*steps, d, v, sigma, side_tolerance(just_met(a, b), sigma, gap_tolerance_(0)),
+    return now + next_step_time<D>(*steps, d, v, sigma,
+                                   side_tolerance(box_, just_met(a, b), a.t == 0 && b.t == 0, sigma),
                                    [&] { return approach_slack(sigma, a.v.norm(), b.v.norm()); });
   const bool apart = d.squaredNorm() > sigma * sigma;
   const double slack = apart ? 0 : approach_slack(sigma, a.v.norm(), b.v.norm() + rate);

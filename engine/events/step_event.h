@@ -26,10 +26,15 @@ struct PairMotion {
 /// place, and a tenth of the least separation of steps (setup/step_options.cc).
 inline constexpr double kJustMet = 1e-7;
 
-/// Within this distance of a step the direction of the motion decides on which side a pair is. `rounding`: of positions
-/// (GapTolerance at 0).
-inline double side_tolerance(bool just_met, double sigma, double rounding) {
-  return just_met ? kJustMet * sigma : rounding;
+/// The same at the start of an epoch, which may follow an event at the end of the last one: the rounding of places
+/// after a flight of 10⁵ contact distances.
+inline constexpr double kEpochRounding = 1e-11;
+
+/// Within this distance of a step the direction of the motion decides on which side a pair is.
+template <int D>
+double side_tolerance(const Box<D>& box, bool just_met, bool at_start, double sigma) {
+  if (just_met) return kJustMet * sigma;
+  return at_start && box.step == 0 ? kEpochRounding * sigma : box.gap_tolerance()(0);
 }
 
 /// The number of steps outside of which a pair is. `slack` as in contact.h: a pair that neither approaches nor recedes

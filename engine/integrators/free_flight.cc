@@ -61,7 +61,8 @@ class FreeFlight : public Integrator<D> {
       flight.give_back(reached, system.particles);
       time = start + reached;
     };
-    const std::uint64_t contacts = report.counters.contacts();
+    const auto events = [&] { return report.counters.contacts() + report.counters.kicks; };
+    const std::uint64_t before = events();
     // Runs to `end` or to a limit; returns whether it reached `end` and no limit: the last contact may be at `end`.
     const auto run = [&](double end) {
       const Stopwatch watch(report.counters.seconds.queue);
@@ -71,7 +72,7 @@ class FreeFlight : public Integrator<D> {
                                         .max_events = most,
                                         .contact_limit = slab.contact_limit});
       return report.reached == end && report.counters.sphere_sphere < slab.collision_limit &&
-             report.counters.contacts() - contacts < slab.contact_limit;
+             events() - before < slab.contact_limit;
     };
     const auto observe = [&](double due) {
       if (!run(due)) return false;

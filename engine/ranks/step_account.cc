@@ -11,7 +11,6 @@ StepAccount own_steps(const System<D>& system, const Particles<D>& state, Neighb
   StepAccount own;
   const Box<D>& box = system.box;
   if (box.steps.empty()) return own;
-  const double rounding = box.gap_tolerance()(0);
   const auto count = [&](const Particles<D>& p, NeighbourList<D>& near) {
     for (const auto& [i, j, image] : near.cover(p.x)) {
       const PairSteps* const steps = box.steps.find(p.id_of(i), p.species[i], p.id_of(j), p.species[j]);
@@ -19,7 +18,7 @@ StepAccount own_steps(const System<D>& system, const Particles<D>& state, Neighb
       const double sigma = p.radius[i] + p.radius[j];
       const std::size_t passed =
           steps_passed<D>(*steps, {p.x[i] - p.x[j] + box.shift(image), p.v[i] - p.v[j]}, sigma,
-                          side_tolerance(false, sigma, rounding), approach_slack(sigma, p.v[i].norm(), p.v[j].norm()));
+                          side_tolerance(box, false, true, sigma), approach_slack(sigma, p.v[i].norm(), p.v[j].norm()));
       if (passed == steps->surfaces.size()) continue;
       ++own.inside;
       if (steps->surfaces.back().tether()) ++own.tethered;

@@ -129,7 +129,7 @@ double WindowedFlight<D>::run(double end, const Report& report) {
                           .reached = ran,
                           .speed = subdomain_.fastest(),
                           .collisions_before = last_tally.sphere_sphere,
-                          .events_before = last_tally.contacts(),
+                          .events_before = last_tally.contacts() + last_tally.kicks,
                           .most_collisions = subdomain_.most_events()});
       last_tally = {};
       collisions += vote.collisions_before;
@@ -156,7 +156,7 @@ double WindowedFlight<D>::run(double end, const Report& report) {
     last_tally = subdomain_.paths().tally();
     const auto end_at = [&](std::uint64_t before, std::uint64_t limit, bool pairs) {
       if (before + vote.most_collisions < limit) return;  // else it may have been reached
-      std::uint64_t count = pairs ? last_tally.sphere_sphere : last_tally.contacts();
+      std::uint64_t count = pairs ? last_tally.sphere_sphere : last_tally.contacts() + last_tally.kicks;
       ranks_.sum({&count, 1});
       if (before + count < limit) return;
       const EventKey<D> last = key_of_contact(limit - before, pairs);
@@ -176,7 +176,7 @@ double WindowedFlight<D>::run(double end, const Report& report) {
   }
   const ContactTally all = sum_of_all(ranks_, sum);
   report.counters.add(all);
-  if (events_ = events_before + all.contacts(); events_ > report.max_events)
+  if (events_ = events_before + all.contacts() + all.kicks; events_ > report.max_events)
     throw_too_many_contacts(box_.contacts, report.max_events);
   if (report.contacts) merge_contacts<D>(gather_on_first(ranks_, message_of<Contact<D>>(contacts)), *report.contacts);
   return reached;

@@ -327,7 +327,7 @@ double SlabCore<D>::step_time(const PairMotion<D>& motion, const PairSteps& step
                               double slack) const {
   const double sigma = particles_.radius[i] + particles_.radius[j];
   const bool just_met = slot_[i] != 0 && slot_[j] != 0 && start(i) == start(j);
-  const double tolerance = side_tolerance(just_met, sigma, scan_->tolerance(0));
+  const double tolerance = side_tolerance(box_, just_met, false, sigma);
   if (a_.empty()) return next_step_time<D>(steps, motion.d, motion.v, sigma, tolerance, [&] { return slack; });
   return next_step_time<D>(steps, motion, a_[i] - a_[j], sigma, time_left, tolerance, scan_->tolerance(sigma), slack);
 }

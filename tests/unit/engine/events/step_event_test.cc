@@ -149,8 +149,10 @@ TEST(StepEvent, ATetherTurnsThePair) {
 
 /// The place of an event in a long epoch is rounded by more than positions are.
 TEST(StepEvent, APairThatHasJustMetIsOnTheSideOfItsMotion) {
-  const auto passed = [](double gap, double speed, bool just_met) {
-    return steps_passed<3>(well(), {{1.5 + gap, 0, 0}, {speed, 1, 0}}, 1, side_tolerance(just_met, 1, 1e-14), kSlack);
+  const Box<3> box;
+  const auto passed = [&](double gap, double speed, bool just_met) {
+    return steps_passed<3>(well(), {{1.5 + gap, 0, 0}, {speed, 1, 0}}, 1, side_tolerance(box, just_met, false, 1),
+                           kSlack);
   };
   for (const double gap : {-1e-11, 1e-11}) {
     EXPECT_EQ(passed(gap, -1, true), 0U);
