@@ -187,7 +187,7 @@ DECK_ERRORS = {
         stepped('between = ["*", "*"]\nrange = 1.5\ndepth = 1.0\n[[contact]]\nbetween = ["*", "*"]\nrestitution = 0.9'),
         9, ["lose track of the steps", "take free-flight"]),
     "steps with cva": (
-        stepped('between = ["*", "*"]\nrange = 1.5\ndepth = 1.0', "cva"), 9, ["'cva' does not know steps", "free-flight, edda"]),
+        stepped('between = ["*", "*"]\nrange = 1.5\ndepth = 1.0', "cva"), 9, ["'cva' does not know steps", "take one of: free-flight, psa, edda"]),
     "wall that is shaken without a frequency": (
         walled('name = "y+"\nvelocity = {amplitude = 1}'), 11, ["'velocity' has no 'frequency'", "positive number"]),
     "wall with a frequency of 0": (
@@ -316,7 +316,7 @@ IMPOSSIBLE_STATES = {
     "step at a length within the core": (
         stepped('between = ["*", "*"]\nrange = 0.9\ndepth = 1.0\nunit = "length"'), ["the step at the distance 0.9", "contact distance 1"]),
     "bond that starts within its core": (
-        stepped("pairs = [[0, 1]]\ntether = 5.0\ncore = 4.0"), ["their core is 4 wide", "a smaller core"]),
+        stepped("pairs = [[0, 1]]\ntether = 5.0\ncore = 4.0"), ["particles 0 and 1 at distance 3, contact distance 4"]),
     "outside a wall": (
         changed("[[2.0, 5.0]", "[[0.25, 5.0]"),
         ["1 sphere is not inside the walls", "particle 0", "0.25 beyond the lower wall of axis 0"]),

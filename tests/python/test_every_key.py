@@ -63,6 +63,10 @@ DECKS = [
                {"name": "ramp", "normal": [0.6, 0.8], "offset": 1.0, "one_sided": False},
                {"name": "valve", "normal": [1.0, 0.0], "offset": 10.0, "one_way": True}]),
     deck(bath=[{"type": "andersen", "temperature": [1.0, 2.0], "ramp_time": [0.0, 5.0], "rate": 0.5, "seed": 3}]),
+    deck(bath=[{"type": "langevin", "temperature": 1.0, "friction": 0.5}]),
+    deck(step=[{"between": ["*", "*"], "range": [1.2, 1.5], "depth": [1.0, 0.5], "unit": "contact"}]),
+    deck(step=[{"pairs": [[0, 1]], "range": 3.0, "depth": 0.1, "unit": "length", "tether": 9.0, "core": 0.9}]),
+    deck(step=[{"chain": True, "chain_length": 2, "tether": 9.0}]),
     placed("fcc", 3, packing_fraction=0.3), placed("simple-cubic", 3, seed=4), placed("hexagonal", packing_fraction=0.3),
     placed("square", seed=2), placed("compressed", growth_rate=0.2, max_collisions=5000.0), placed("file", file="places.txt"),
     deck(system=FLAT | {"boundary": ["periodic", "periodic"]}, integrator={"type": "verlet", "step": 0.01},
@@ -120,6 +124,8 @@ def by_calls(deck):
         sim.add_wall(**table)
     for table in deck.get("contact", []):
         sim.add_contact(*table["between"], **{key: value for key, value in table.items() if key != "between"})
+    for table in deck.get("step", []):
+        sim.add_step(*table.get("between", []), **{key: value for key, value in table.items() if key != "between"})
     for table in deck.get("bath", []):
         sim.add_bath(**table)
     for table in deck.get("interaction", []):

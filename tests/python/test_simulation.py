@@ -586,3 +586,26 @@ def test_a_crystal_has_one_energy_however_much_of_it_is_in_the_box(tmp_path, met
         for axis in "xx", "yy", "zz":
             assert means[axis]["mean"] == pytest.approx(pressure + tail["pressure"], rel=1e-12)
         assert abs(means["xy"]["mean"]) < 1e-12
+
+
+def test_wells_and_friction_are_those_of_a_deck(tmp_path):
+    """V counts the pairs in the well, also before the first run; steps grow with species, and bad ones change nothing."""
+    deck = carom.Simulation.from_deck(ROOT / "inputs/square-well.toml", set={"particles.0.count": 108, "run.end_time": 1.0})
+    hand = carom.Simulation(dimension=3, boundary="periodic")
+    hand.add_particles(count=108, temperature=1.5, radius=0.5, species="sphere")
+    hand.place("fcc", packing_fraction=0.2617993877991494, seed=7)
+    hand.add_step("sphere", "sphere", range=1.5, depth=1.0)
+    hand.add_bath("andersen", temperature=1.5, rate=0.1, seed=7)
+    hand.integrator("free-flight")
+    assert hand.potential == deck.potential == -6 * 108  # the neighbours of an fcc lattice, of which each pair counts once
+    for sim in (deck, hand):
+        sim.run(time=1.0)
+    assert same_state(deck, hand) and hand.potential == deck.potential != -6 * 108
+    with pytest.raises(carom.UsageError, match="'ion' is no species; give one of: sphere"):
+        hand.add_step("ion", "*", range=1.5, depth=1.0)
+    assert len(hand.steps) == 1
+
+    brownian = gas(27)
+    brownian.add_bath("langevin", temperature=2.0, friction=[5.0])
+    with pytest.raises(carom.UsageError, match="needs 'friction'"):
+        brownian.add_bath("langevin", temperature=2.0)
