@@ -63,7 +63,7 @@ DECKS = [
                {"name": "ramp", "normal": [0.6, 0.8], "offset": 1.0, "one_sided": False},
                {"name": "valve", "normal": [1.0, 0.0], "offset": 10.0, "one_way": True}]),
     deck(bath=[{"type": "andersen", "temperature": [1.0, 2.0], "ramp_time": [0.0, 5.0], "rate": 0.5, "seed": 3}]),
-    deck(bath=[{"type": "langevin", "temperature": 1.0, "friction": 0.5}]),
+    deck(bath=[{"type": "langevin", "temperature": 1.0, "friction": 0.5, "seed": 1}]),
     deck(step=[{"between": ["*", "*"], "range": [1.2, 1.5], "depth": [1.0, 0.5], "unit": "contact"}]),
     deck(step=[{"pairs": [[0, 1]], "range": 3.0, "depth": 0.1, "unit": "length", "tether": 9.0, "core": 0.9}]),
     deck(step=[{"chain": True, "chain_length": 2, "tether": 9.0}]),

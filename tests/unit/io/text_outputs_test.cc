@@ -48,12 +48,12 @@ TEST(Thermo, RowsHoldExactDoublesAtOnce) {
   std::getline(in, row);
   EXPECT_EQ(header,
             "time,step,collisions,kinetic,potential,total,shadow,max_energy_error,momentum_x,momentum_y,momentum_z,"
-            "temperature,pressure,conserved,dissipated,work,heat,rotational,rotational_temperature,step_length,"
+            "temperature,pressure,conserved,dissipated,work,heat,rotational,rotational_temperature,step_length,bonds,"
             "pressure_y-,pressure_y+,pressure_z-,pressure_z+");
   std::vector<double> values;
   for (std::istringstream cells(row); std::getline(cells, cell, ',');)
     values.push_back(std::strtod(cell.c_str(), nullptr));
-  ASSERT_EQ(values.size(), 24U);
+  ASSERT_EQ(values.size(), 25U);
   EXPECT_EQ(values[0], 0.1);
   EXPECT_EQ(values[2], 21);
   EXPECT_EQ(values[5], 1.25);
@@ -323,6 +323,7 @@ TEST(Summary, HasEveryValueByItsName) {
   Counters& c = s.counters;
   c.sphere_sphere = 30, c.sphere_wall = 31, c.max_overlap = 32.5, c.sweeps = 33, c.pieces = 34, c.slabs_halved = 35;
   c.frozen = 36, c.fallbacks = 37, c.folded = 4, c.kicks = 38;
+  c.steps.entered = 39, c.steps.left = 40, c.steps.bounced = 41;
   c.dissipated.add(5.5), c.work.add(6.5), c.heat.add(7.5);
   // Of the first mean and of the wall 2 only; pressures are (1 … 16) and forces 3.
   s.series = Blocking(Statistics::mean_names.size() + 3);
@@ -350,7 +351,8 @@ TEST(Summary, HasEveryValueByItsName) {
   EXPECT_FALSE(json.contains("equilibration"));
   EXPECT_EQ(json, nlohmann::json::parse(R"({"status": "failed", "error": "disk \ufffd full", "warnings": ["a warning"],
     "deck": "sample.toml", "title": "three spheres", "integrator": "free-flight", "dimension": 2, "particles": 3,
-    "ranks": 2, "steps": 10, "end_time": 11.5, "events": {"sphere_sphere": 30, "sphere_wall": 31, "kicks": 38},
+    "ranks": 2, "steps": 10, "end_time": 11.5, "events": {"sphere_sphere": 30, "sphere_wall": 31, "kicks": 38,
+    "entered": 39, "left": 40, "bounced": 41},
     "energy": {"initial": 13.5, "after_first_step": 14.5, "final": 15.5, "reference": 16.0, "max_abs_error": 17.5,
                "dissipated": 5.5, "work": 6.5, "heat": 7.5, "folded": 0.25},
     "walls": {"x+": {"collisions": 0, "force": 0.0, "pressure": 0.0, "work": 0.0, "heat": 0.0,
