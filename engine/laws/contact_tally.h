@@ -164,7 +164,8 @@ struct ContactTally : OverlapTally {
     for (std::size_t number = other.walls.size(); number-- > 0;) wall(static_cast<Id>(number)).add(other.walls[number]);
   }
   void archive(Archive& archive) {
-    archive(sphere_sphere, sphere_wall, kicks, max_overlap, worst, collision_virial, dissipated, work, heat, steps, walls);
+    archive(sphere_sphere, sphere_wall, kicks, max_overlap, worst, collision_virial, dissipated, work, heat, steps,
+            walls);
   }
   /// Counts a contact and appends it to `log` unless `log` is null.
   template <int D>
