@@ -307,7 +307,7 @@ void Simulation<D>::run(const Hooks& hooks) {
                              },
                          .watch = &watch};
     const auto met = [&] { return s.counters.sphere_sphere + s.counters.steps.events(); };
-    const std::uint64_t collisions = met(), at_walls = s.counters.sphere_wall;
+    const std::uint64_t cores = s.counters.sphere_sphere, collisions = met(), at_walls = s.counters.sphere_wall;
     if (!fly(slab, report, watch)) {
       if (hooks.left) hooks.left();
       continue;
@@ -315,7 +315,7 @@ void Simulation<D>::run(const Hooks& hooks) {
     show_contacts(slab);
     s.counters.seconds.communicate = system_->decomposition.seconds_waited();
     const std::uint64_t pairs = met() - collisions, walls = s.counters.sphere_wall - at_walls;
-    if (pairs > 0) quiet_since_ = slab.start + report.reached;
+    if (s.counters.sphere_sphere > cores) quiet_since_ = slab.start + report.reached;
     const double complete = clock_.end_slab(slab, report.reached, pairs, walls, report.boxes, s);
     act_of_bath(slab, complete, report);
     if (info_.adapts) adapt(slab, report, 2 * pairs + walls, complete);
