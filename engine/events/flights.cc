@@ -96,7 +96,7 @@ void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, co
   field_ = g != Vec<D>::Zero();
   growth_ = 0;
   has_internal_ = laws().need_internal();
-  has_steps_ = !box_.steps.empty() && growth_ == 0;
+  has_steps_ = !box_.steps.empty();
   horizon_ = horizon;
   common_radius_ = common(sizes.radius);
   common_mass_ = common(sizes.mass);
@@ -141,7 +141,7 @@ double Flights<D>::pair_contact(Slot i, const Record<D>& a, Slot j, const Record
   const double radii = radius(i) + radius(j), sigma = grown(radii, now), rate = radii * growth_;
   if (const PairSteps* const steps = steps_of(a, b)) [[unlikely]]
     return now + next_step_time<D>(*steps, d, v, sigma,
-                                   side_tolerance(box_, just_met(a, b), a.t == 0 && b.t == 0, sigma),
+                                   side_tolerance(just_met(a, b), a.t == 0 && b.t == 0, sigma, gap_tolerance_(0)),
                                    [&] { return approach_slack(sigma, a.v.norm(), b.v.norm()); });
   const bool apart = d.squaredNorm() > sigma * sigma;
   const double slack = apart ? 0 : approach_slack(sigma, a.v.norm(), b.v.norm() + rate);
@@ -225,12 +225,11 @@ EventResult<D> Flights<D>::meet_step(const StepSurface& step, Slot i, Record<D>&
                                      const Vec<D>& d, std::uint32_t generation) const {
   const Vec<D> v = a.v - b.v;
   const double sigma = contact_distance(i, j), inverse_mass = 1 / mass(i) + 1 / mass(j);
-  const StepImpulse met = step_impulse<D>(step, d, v, inverse_mass);
-  const Vec<D> impulse = met.factor * d;
-  a.v += impulse / mass(i);
-  b.v -= impulse / mass(j);
+  const PairImpulse<D> met = step_impulse<D>(step, d, v, inverse_mass);
+  met.apply(d, mass(i), a.v, mass(j), b.v);
   a.generation = b.generation = static_cast<std::uint16_t>(generation);
   const double range = step.distance(sigma);
+  const Vec<D> impulse = met.on_first(d);
   return {d,
           impulse,
           {.virial = d.dot(impulse), .stored = met.stored, .event = met.event},

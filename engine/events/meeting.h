@@ -49,13 +49,15 @@ double collision_factor(const Vec<D>& d, const Vec<D>& v, double mass_i, double 
   return -(1 + e) * (d.dot(v) - sigma * w) / (d.squaredNorm() * (1 / mass_i + 1 / mass_j));
 }
 
-/// What a contact does to the first of two spheres; the second gets the opposite impulse.
+/// What an event does to the first of two spheres; the second gets the opposite impulse.
 template <int D>
 struct PairImpulse {
   double factor = 0;      ///< the impulse is factor·d + rubbed
   double dissipated = 0;  ///< energy lost
   bool rough = false;     ///< whether `rubbed` is set
   Vec<D> rubbed{};        ///< the tangential part
+  double stored = 0;      ///< energy that a step takes from the motion
+  PairEvent event = PairEvent::core;
 
   Vec<D> on_first(const Vec<D>& d) const {
     Vec<D> all = factor * d;

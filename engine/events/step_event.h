@@ -10,7 +10,7 @@
 // energy of the steps with the ledger and ends the run then.
 
 #include "engine/events/contact.h"
-#include "engine/laws/contact_log.h"
+#include "engine/events/meeting.h"
 #include "engine/laws/steps.h"
 
 namespace carom {
@@ -22,19 +22,18 @@ struct PairMotion {
   double b = d.dot(v), distance = d.norm();
 };
 
-/// A pair that has just met is at the step that is nearest, relative to the distance: far more than the rounding of a
-/// place, and a tenth of the least separation of steps (setup/step_options.cc).
+/// A pair that has just met is within this distance of what it met, relative to the contact distance: far more than the
+/// rounding of a place, and a tenth of Steps::kLeastSeparation.
 inline constexpr double kJustMet = 1e-7;
 
-/// The same at the start of an epoch, which may follow an event at the end of the last one: the rounding of places
-/// after a flight of 10⁵ contact distances.
+/// At the start of an epoch a pair may have met at the end of the last one: this is the rounding of places after a
+/// flight of 10⁵ contact distances, relative to one.
 inline constexpr double kEpochRounding = 1e-11;
 
-/// Within this distance of a step the direction of the motion decides on which side a pair is.
-template <int D>
-double side_tolerance(const Box<D>& box, bool just_met, bool at_start, double sigma) {
-  if (just_met) return kJustMet * sigma;
-  return at_start && box.step == 0 ? kEpochRounding * sigma : box.gap_tolerance()(0);
+/// Within this distance of a step the direction of the motion decides on which side a pair is. `rounding`: of positions
+/// (GapTolerance at 0).
+inline double side_tolerance(bool just_met, bool starts_epoch, double sigma, double rounding) {
+  return just_met ? kJustMet * sigma : starts_epoch ? kEpochRounding * sigma : rounding;
 }
 
 /// The number of steps outside of which a pair is. `slack` as in contact.h: a pair that neither approaches nor recedes
@@ -127,7 +126,8 @@ template <int D, class Slack>
   return b > 0 ? (outside * outside - squared) / (b + root) : (root - b) / v2;
 }
 
-/// The same for parabolic relative motion, in [0, time_left). `core_tolerance`: the gap at which cores touch.
+/// As above, for parabolic relative motion d + v s + a s²/2 in [0, time_left). Cores touch up to the gap
+/// `core_tolerance`.
 template <int D>
 double next_step_time(const PairSteps& steps, const PairMotion<D>& motion, const Vec<D>& a, double sigma,
                       double time_left, double tolerance, double core_tolerance, double slack) {
@@ -153,22 +153,15 @@ inline const StepSurface* step_at(const PairSteps& steps, double distance, doubl
   return nearest;
 }
 
-/// What happens to a pair at a step: the impulse is factor·d on the first sphere.
-struct StepImpulse {
-  double factor = 0;
-  double stored = 0;  ///< the energy that goes from the motion into the potential [energy]
-  PairEvent event = PairEvent::bounce;
-};
-
 /// A pair reaches a step. It crosses if b² > 2 c d² (1/m_i + 1/m_j), where c is the energy that it must climb, and
 /// then b² decreases by this number; otherwise b changes its sign (Alder, Wainwright, J. Chem. Phys. 31 (1959) 459).
 /// The factor has no cancellation for small c, and d is not normalised, so that the kinetic energy changes by −c to
 /// rounding.
 template <int D>
-StepImpulse step_impulse(const StepSurface& step, const Vec<D>& d, const Vec<D>& v, double inverse_mass) {
+PairImpulse<D> step_impulse(const StepSurface& step, const Vec<D>& d, const Vec<D>& v, double inverse_mass) {
   const double b = d.dot(v), weight = d.squaredNorm() * inverse_mass;
   const double climb = b > 0 ? step.climb : -step.climb, left = b * b - 2 * climb * weight;
-  if (step.tether() || !(left > 0)) return {.factor = -2 * b / weight};
+  if (step.tether() || !(left > 0)) return {.factor = -2 * b / weight, .event = PairEvent::bounce};
   return {.factor = -2 * climb / (b + std::copysign(std::sqrt(left), b)),
           .stored = climb,
           .event = b > 0 ? PairEvent::leave : PairEvent::enter};

@@ -184,6 +184,7 @@ struct MotionSums {
 };
 
 /// Sums over this rank's own particles: the momentum in `state`, the rest in `at`. `near`: for own_steps().
+/// Collective if pairs have steps.
 template <int D>
 MotionSums<D> own_motion(const System<D>& system, const Particles<D>& state, const Particles<D>& at,
                          NeighbourList<D>* near = nullptr) {

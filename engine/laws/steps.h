@@ -10,7 +10,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
-#include <span>
+#include <utility>
 #include <vector>
 
 #include "engine/base/vec.h"
@@ -58,6 +58,10 @@ struct Reach {
 /// The steps of all pairs.
 class Steps {
  public:
+  /// The least distance of two steps of a pair, or of a step and the core, relative to the contact distance: a pair
+  /// that reaches one must be able to tell which one it is (kJustMet in events/step_event.h).
+  static constexpr double kLeastSeparation = 1e-6;
+
   bool empty() const { return lists_.empty(); }
   /// For this many species; pairs have no steps until they are set.
   void resize(std::size_t species) {

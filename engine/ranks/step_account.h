@@ -2,6 +2,8 @@
 #pragma once
 // The energy of the steps of a state, counted from positions: the check of the energy that events have stored.
 
+#include <string>
+
 #include "engine/base/exact_sum.h"
 #include "engine/base/particles.h"
 #include "engine/ranks/system.h"
@@ -19,16 +21,19 @@ struct StepAccount {
     inside += other.inside;
     tethered += other.tethered;
   }
+  /// Throws Error(Failure::numerical) if the energy is not the one that events have stored, so that a pair has changed
+  /// sides unseen (step_event.h), or if a tether has lost a pair. `when`: for the message.
+  void check(const Steps& steps, double by_events, const std::string& when) const;
 };
 
-/// What this rank's pairs contribute; `state`: positions and velocities of this rank's particles. `near`: pairs within
-/// reach, from an earlier call; null: they are searched for. Collective.
+/// What this rank's pairs contribute; `state`: positions and velocities of this rank's particles. `near`: the list of
+/// pairs_within_reach(), or null, where one is made. Collective if pairs have steps.
 template <int D>
 StepAccount own_steps(const System<D>& system, const Particles<D>& state, NeighbourList<D>* near = nullptr);
 
-/// The list for own_steps().
+/// The pairs to which something may happen before the next list.
 template <int D>
-NeighbourList<D> step_pairs(const System<D>& system, const Particles<D>& state) {
+NeighbourList<D> pairs_within_reach(const System<D>& system, const Particles<D>& state) {
   return NeighbourList<D>(system.box, system.box.steps.reach()(state.radius), state.ghost, state.all_fixed());
 }
 

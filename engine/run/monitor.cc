@@ -97,13 +97,11 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
       this,
       [this] {
         touching_.reset();
-        stepping_.reset();
         std::vector<Vec<D>>().swap(scratch_);
       },
       [this] {
         const Particles<D>& p = system_.particles;
-        if (info_.hard_cores) touching_.emplace(system_.box, p.radius, p.ghost, p.all_fixed());
-        if (!system_.box.steps.empty()) stepping_.emplace(step_pairs(system_, p));
+        if (info_.hard_cores) touching_.emplace(pairs_within_reach(system_, p));
         if (info_.shadow) scratch_.resize(p.size());
       });
 }
@@ -153,28 +151,6 @@ void Monitor<D>::guard(double energy_before, double magnitude_before) {
   if (info_.exact && jump > kLargestEnergyJump * std::max({s.energy_reference, magnitude_before, account_.magnitude}))
     fail("the energy, which " + std::string(info_.name) + " keeps to rounding, jumped by " + short_text(jump) + " to " +
          short_text(account_.energy));
-}
-
-/// Throws if the energy of the steps by positions is not the one that events have stored, so that a pair has changed
-/// sides unseen (step_event.h), or if a tether has lost a pair.
-template <int D>
-void Monitor<D>::check_steps(const Waiting& slab, const StepAccount& counted) {
-  const Steps& steps = system_.box.steps;
-  if (steps.empty()) return;
-  const double by_events = first_step_energy_ + slab.tally.steps.stored.value(), by_positions = counted.energy.value();
-  const std::string when =
-      " between the times " + short_text(slab.time - slab.elapsed, 10) + " and " + short_text(slab.time, 10);
-  constexpr double kRounding = 1e-6;  // of the sums, relative to the smallest jump of an energy
-  if (std::abs(by_positions - by_events) > kRounding * steps.least_climb())
-    throw Error(Failure::numerical,
-                "a pair has changed the side of a step unseen" + when + ": the energy of all steps is " +
-                    short_text(by_positions, 12) + " by positions and " + short_text(by_events, 12) +
-                    " by events; another sphere has turned the pair within rounding of the step, which is rare: "
-                    "continue from the last checkpoint with another integrator.step, or start with another seed");
-  if (counted.tethered != steps.tethers())
-    throw Error(Failure::numerical, "tethers have lost their pairs (" +
-                                        std::to_string(steps.tethers() - counted.tethered) + ")" + when +
-                                        "; use a smaller integrator.step");
 }
 
 /// Names the fastest particle, for messages. Collective.
@@ -324,7 +300,9 @@ void Monitor<D>::take(const Waiting& slab, const Sums& sums) {
   if (s.max_shadow_energy_error)
     s.max_shadow_energy_error =
         std::max(*s.max_shadow_energy_error, std::abs(shot_.shadow + slab.tally.drained() - account_.first_shadow));
-  check_steps(slab, sums.motion.steps);
+  sums.motion.steps.check(
+      system_.box.steps, first_step_energy_ + slab.tally.steps.stored.value(),
+      "between the times " + short_text(slab.time - slab.elapsed, 10) + " and " + short_text(slab.time, 10));
   guard(energy, magnitude);
   if (s.max_momentum_error)
     s.max_momentum_error = std::max(*s.max_momentum_error,
@@ -366,7 +344,7 @@ typename Monitor<D>::Waiting Monitor<D>::observed(double time, const Particles<D
   Waiting now{time,
               statistics_.steps,
               &state,
-              {own_motion(system_, state, nodes, stepping_ ? &*stepping_ : nullptr),
+              {own_motion(system_, state, nodes, touching_ ? &*touching_ : nullptr),
                potential ? *potential : own_energy<D>(system_, nodes.x),
                {}},
               statistics_.counters};
@@ -470,8 +448,9 @@ OverlapTally Monitor<D>::overlaps(double time) {
   const Particles<D>& p = system_.particles;
   const Decomposition<D>& ranks = system_.decomposition;
   if (ranks.joined() && !ranks.by_place()) {
-    const Particles<D> halo = halo_of(system_.box, 2 * ranks.sizes().largest_radius(), ranks.ranks(), p);
-    NeighbourList<D> touching(system_.box, halo.radius, halo.ghost, halo.all_fixed());
+    const double reach = system_.box.steps.reach()(ranks.sizes().largest_radius());
+    const Particles<D> halo = halo_of(system_.box, 2 * reach, ranks.ranks(), p);
+    NeighbourList<D> touching = pairs_within_reach(system_, halo);
     look(touching, halo);
   } else {
     look(*touching_, p);

@@ -128,7 +128,6 @@ class Monitor {
   void add_to_series(const Waiting& slab, double path);
   void note_overlap(const Waiting& slab, const Sums& sums);
   void guard(double energy_before, double magnitude_before);
-  void check_steps(const Waiting& slab, const StepAccount& counted);
   std::string fastest(const Particles<D>& state) const;
   OverlapTally overlaps(double time);
   const Particles<D>& all_particles(const Particles<D>& state);
@@ -170,8 +169,7 @@ class Monitor {
   std::vector<Waiting> waiting_;              // the last slabs
   Tail tail_;                                 // added to output, not to H and its errors
   std::vector<Vec<D>> scratch_;               // for S_h
-  std::optional<NeighbourList<D>> touching_;  // pairs that may overlap
-  std::optional<NeighbourList<D>> stepping_;  // pairs that may have a step between them
+  std::optional<NeighbourList<D>> touching_;  // pairs that may overlap, or have a step between them
   Particles<D> gathered_;                     // collected from the blocks of all ranks
 };
 

@@ -82,9 +82,10 @@ void check_rest_speeds(const System<D>& system) {
                                      short_text(thermal) + "; give a smaller one, or none");
 }
 
-/// Throws if the method refuses steps or a force; fixed particles matter from count_moving() on.
+/// Throws if the method refuses steps or a force, or the bath does not fit the species; fixed particles matter from
+/// count_moving() on.
 template <int D>
-void check_forces(const System<D>& system, const IntegratorInfo& info) {
+void check_laws(const System<D>& system, const IntegratorInfo& info) {
   if (const std::string no = info.refusal_of_steps(); !no.empty() && !system.box.steps.empty())
     throw Error(Failure::deck, no);
   if (info.stepping && !system.box.steps.empty() && !system.box.contacts.elastic())
@@ -176,7 +177,7 @@ template <int D>
 typename Simulation<D>::Prepared Simulation<D>::prepare(const System<D>& system, const IntegratorInfo& info,
                                                         Parameters given, Plan plan) {
   system.check();
-  check_forces(system, info);
+  check_laws(system, info);
   if (info.hard_cores) check_spheres(system);
   if (plan.step != 0 && given.has("step"))
     throw Error(Failure::deck, "the step is given twice; give it with the plan or with the integrator, not with both");
@@ -226,7 +227,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
     system_->count_moving();
     if (system_->moving() == 0 && system_->has_fixed())
       throw Error(Failure::deck, "all particles are fixed and nothing would move; give some a finite mass");
-    check_forces(*system_, info_);
+    check_laws(*system_, info_);
     if (!hooks.restore) check_rest_speeds(*system_);
     const double contacts = info_.adapts ? contact_rate(*system_) : 0;
     if (info_.smooth_forces) {

@@ -44,7 +44,8 @@ std::string step_problem(const System<D>& system) {
   for (std::size_t a = 0; a < radius.size(); ++a)
     for (std::size_t b = 0; b <= a; ++b)
       if (const PairSteps* const of = steps.of_species(a, b))
-        if (const double contact = radius[a] + radius[b]; of->surfaces.front().distance(contact) <= contact)
+        if (const double contact = radius[a] + radius[b];
+            of->surfaces.front().distance(contact) < (1 + Steps::kLeastSeparation) * contact)
           return "the step at the distance " + short_text(of->surfaces.front().range) + " between '" +
                  system.species[a] + "' and '" + system.species[b] + "' is not above their contact distance " +
                  short_text(contact) + "; give a larger range";
@@ -66,7 +67,7 @@ std::string step_problem(const System<D>& system) {
       const double core = of.core_distance(contact),
                    inmost = of.surfaces.empty() ? 2 * core : of.surfaces[0].distance(contact);
       const std::string pair = "particles " + std::to_string(i) + " and " + std::to_string(j);
-      if (!(core < inmost))
+      if (inmost < (1 + Steps::kLeastSeparation) * core)
         problem = pair + " have a step at the distance " + short_text(inmost) + ", not above their contact distance " +
                   short_text(core) + "; give a larger one, or a smaller 'core'";
       else if (p.fixed(i) && p.fixed(j))

@@ -11,10 +11,6 @@ namespace {
   throw Error(Failure::deck, what + "; " + remedy);
 }
 
-/// Relative to the distance: positions are rounded to 1e-16 of the box, and a pair near two steps could not tell which
-/// one it has reached.
-constexpr double kLeastSeparation = 1e-6;
-
 std::vector<double> numbers(const Parameters& given, const char* key) {
   if (const auto* one = given.find<double>(key)) return {*one};
   const auto* all = given.find<std::vector<double>>(key);
@@ -32,7 +28,7 @@ PairSteps steps_of(const Parameters& given, bool listed) {
   if (const auto* core = given.find<double>("core")) steps.core = *core;
   double inside = of_contact ? 1 : steps.core;
   for (std::size_t k = 0; k < range.size(); ++k) {
-    if (!(range[k] >= (1 + kLeastSeparation) * inside))
+    if (!(range[k] >= (1 + Steps::kLeastSeparation) * inside))
       refuse("range " + short_text(range[k]) +
                  (k > 0 ? " is not above the range " + short_text(inside) + " before it"
                         : " is not above the contact distance" + std::string(of_contact ? ", 1 in its unit" : "")),
@@ -46,7 +42,7 @@ PairSteps steps_of(const Parameters& given, bool listed) {
   if (const auto* tether = given.find<double>("tether")) {
     if (of_contact && !range.empty())
       refuse("'tether' is a length, and 'range' is given in contact distances", "add unit = \"length\"");
-    if (!(*tether >= (1 + kLeastSeparation) * (of_contact ? steps.core : inside)))
+    if (!(*tether >= (1 + Steps::kLeastSeparation) * (of_contact ? steps.core : inside)))
       refuse("the tether " + short_text(*tether) + " is not above " +
                  (range.empty() ? "the core " + short_text(steps.core) : "the range " + short_text(inside)),
              "give a larger tether");

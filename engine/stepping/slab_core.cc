@@ -327,7 +327,7 @@ double SlabCore<D>::step_time(const PairMotion<D>& motion, const PairSteps& step
                               double slack) const {
   const double sigma = particles_.radius[i] + particles_.radius[j];
   const bool just_met = slot_[i] != 0 && slot_[j] != 0 && start(i) == start(j);
-  const double tolerance = side_tolerance(box_, just_met, false, sigma);
+  const double tolerance = side_tolerance(just_met, false, sigma, scan_->tolerance(0));
   if (a_.empty()) return next_step_time<D>(steps, motion.d, motion.v, sigma, tolerance, [&] { return slack; });
   return next_step_time<D>(steps, motion, a_[i] - a_[j], sigma, time_left, tolerance, scan_->tolerance(sigma), slack);
 }
@@ -499,22 +499,17 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     Flight& hi = flights_[slot_[key.hi] - 1];
     const Vec<D> d = lo.x - hi.x + box_.shift(key.image), v = lo.v - hi.v;
     contact.x_hi = hi.x - box_.shift(key.image);
-    if (const StepSurface* const step = has_steps_ ? step_of(key) : nullptr) {
-      if (step->tether() && !(d.dot(v) > 0)) return;
-      const double inverse_mass = 1 / particles_.mass[key.lo] + 1 / particles_.mass[key.hi];
-      const StepImpulse met = step_impulse<D>(*step, d, v, inverse_mass);
-      contact.impulse = met.factor * d;
-      lo.v += contact.impulse / particles_.mass[key.lo];
-      hi.v -= contact.impulse / particles_.mass[key.hi];
-      contact.exchange = {.virial = d.dot(contact.impulse), .stored = met.stored, .event = met.event};
-    } else {
-      if (!(d.dot(v) < 0)) return;
-      const auto impulse = pair_impulse<D>(box_.contacts, d, v, partner(lo), partner(hi));
-      impulse.apply(d, particles_.mass[key.lo], lo.v, particles_.mass[key.hi], hi.v);
-      contact.impulse = impulse.on_first(d);
-      contact.exchange = {.virial = (contact.x_lo - contact.x_hi).dot(impulse.factor * d),
-                          .dissipated = impulse.dissipated};
-    }
+    const StepSurface* const step = has_steps_ ? step_of(key) : nullptr;
+    if (step ? step->tether() && !(d.dot(v) > 0) : !(d.dot(v) < 0)) return;
+    const double m_lo = particles_.mass[key.lo], m_hi = particles_.mass[key.hi];
+    const auto impulse = step ? step_impulse<D>(*step, d, v, 1 / m_lo + 1 / m_hi)
+                              : pair_impulse<D>(box_.contacts, d, v, partner(lo), partner(hi));
+    impulse.apply(d, m_lo, lo.v, m_hi, hi.v);
+    contact.impulse = impulse.on_first(d);
+    contact.exchange = {.virial = (contact.x_lo - contact.x_hi).dot(impulse.factor * d),
+                        .dissipated = impulse.dissipated,
+                        .stored = impulse.stored,
+                        .event = impulse.event};
     contact.v_hi = hi.v;
     checks_path(hi);
   }

@@ -189,11 +189,9 @@ void make_interactions(const Deck::Source& source, System<D>& system, bool place
         if (const std::string no = source.integrator->refusal(*term, fixed); !no.empty())
           throw Error(Failure::deck, no);
       terms[n] = std::move(term);
-    } catch (const Error& e) {  // the message of e has the form "what; what to do"
+    } catch (const Error& e) {
       const std::string message = e.what();
-      const std::size_t cut = std::min(message.find("; "), message.size());
-      problems.error(config.at, message.substr(0, cut),
-                     cut < message.size() ? message.substr(cut + 2) : "see `carom schema`");
+      problems.error(config.at, message.find("; ") < message.size() ? message : message + "; see `carom schema`");
     }
   };
   const auto& all = source.interactions;  // bonds before the terms that leave out bonded pairs

@@ -76,7 +76,7 @@ class Interpreter {
     }
   }
 
-  /// Adds walls and contacts to a box, if enough is known about it.
+  /// Adds walls, contacts and steps to a box, if enough is known about it.
   void try_walls() {
     const auto attempt = [&](auto box) {
       std::copy_n(source_.boundary.begin(), dimension_, box.boundary.begin());
@@ -113,9 +113,7 @@ class Interpreter {
     try {
       work();
     } catch (const Error& e) {
-      const std::string message = e.what();
-      const std::size_t cut = message.find("; ");
-      problems_.error(at, message.substr(0, cut), message.substr(cut + 2));
+      problems_.error(at, e.what());
       return true;
     }
     return false;
@@ -398,7 +396,7 @@ class Interpreter {
     const std::size_t before = problems_.errors();
     if (table.variant->name == "table")
       if (const std::string wrong = read_points(table.values, deck_.file.parent_path(), reader_); !wrong.empty())
-        problems_.error(table.place("file"), wrong.substr(0, wrong.find("; ")), wrong.substr(wrong.find("; ") + 2));
+        problems_.error(table.place("file"), wrong);
     ids_exist(table);
     species_exist(table);
     source_.interactions.push_back({.info = &find_interaction(table.variant->name),

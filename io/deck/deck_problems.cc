@@ -32,7 +32,11 @@ std::string Place::text() const {
 }
 
 void Problems::error(const Place& place, const std::string& what, const std::string& remedy) {
-  errors_.push_back({place, place.text() + ": error: " + what + "; " + remedy});
+  error(place, what + "; " + remedy);
+}
+
+void Problems::error(const Place& place, const std::string& message) {
+  errors_.push_back({place, place.text() + ": error: " + message});
 }
 
 void Problems::warning(const Place& place, const std::string& what, const std::string& remedy) {

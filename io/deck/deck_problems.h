@@ -25,6 +25,8 @@ struct Place {
 class Problems {
  public:
   void error(const Place& place, const std::string& what, const std::string& remedy);
+  /// `message`: "what; remedy", as errors of the engine have it.
+  void error(const Place& place, const std::string& message);
   void warning(const Place& place, const std::string& what, const std::string& remedy);
   std::size_t errors() const { return errors_.size(); }
   /// Throws an Error with all errors, one a line, in the order of their places, if there are any.

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "engine/base/error.h"
+#include "engine/search/neighbour_list.h"
 
 namespace carom {
 namespace {
@@ -36,10 +37,16 @@ double estimated_memory(const Deck::Source& source, const Box<D>* box) {
   const auto particles = static_cast<double>(source.particles());
   const auto pair = [](const InteractionConfig& term) { return term.info->kind == InteractionInfo::Kind::pair; };
   const bool lists = std::ranges::any_of(source.interactions, pair);
+  double radius = 0;  // the largest one
+  for (const SpeciesConfig& species : source.species)
+    if (!species.radius.empty()) radius = std::max(radius, std::ranges::max(species.radius));
   double bytes = program + particles * (2 * state + events + (lists ? neighbours : 0));
   for (const InteractionConfig& term : source.interactions)
     if (box && pair(term) && term.parameters.has("cutoff"))
       bytes += memory_of_pairs(particles, term.parameters.real("cutoff"), *box);
+  // A candidate of the event core, or a NeighbourPair in the list of a method with steps; and one that counts energies.
+  constexpr double of_pair = 2.0 * sizeof(NeighbourPair<D>) / sizeof(std::uint32_t);
+  if (box && !box->steps.empty()) bytes += of_pair * memory_of_pairs(particles, 2 * box->steps.reach()(radius), *box);
   return bytes;
 }
 
@@ -62,11 +69,16 @@ void check_memory(const Deck::Source& source, const Box<D>* box, int ranks) {
   Place place = std::ranges::max_element(source.species, {}, &SpeciesConfig::count)->at;
   std::string remedy = "take fewer particles, or more ranks on more machines";
   if (box && estimated_memory<D>(source, nullptr) <= there * ranks) {
+    remedy = "take a shorter cutoff; in a periodic box each particle meets all images of each other within it";
     const auto cutoff = [](const InteractionConfig& term) {
       return term.parameters.has("cutoff") ? term.parameters.real("cutoff") : 0.0;
     };
-    place = std::ranges::max_element(source.interactions, {}, cutoff)->at;
-    remedy = "take a shorter cutoff; in a periodic box each particle meets all images of each other within it";
+    if (!box->steps.empty()) {
+      place = source.values.list("step").front().at;
+      remedy = "take shorter ranges of steps and cutoffs";
+    } else {
+      place = std::ranges::max_element(source.interactions, {}, cutoff)->at;
+    }
   }
   Problems problems;
   problems.error(place,

@@ -148,10 +148,8 @@ void check_state(const Deck& deck, const System<D>& system, Problems& problems, 
   if (!source.integrator->hard_cores) return;
   check_box(source, system, problems);
   if (problems.errors() == 0) check_spheres(source, system, problems);
-  if (const std::string problem = problems.errors() == 0 ? step_problem(system) : ""; !problem.empty()) {
-    const std::size_t cut = problem.find("; ");
-    problems.error(source.values.list("step").front().at, problem.substr(0, cut), problem.substr(cut + 2));
-  }
+  if (const std::string problem = problems.errors() == 0 ? step_problem(system) : ""; !problem.empty())
+    problems.error(source.values.list("step").front().at, problem);
 }
 
 template <int D>

@@ -68,13 +68,28 @@ WIDTHS = [width for width, flag in (("sse2", "sse2"), ("avx2", "avx2"), ("avx512
           if flag in pathlib.Path("/proc/cpuinfo").read_text().split()]
 
 
+def expect_same_anywhere(deck, output, plain, killer, all_ranks):
+    """The run in `plain` has the bits of runs on these numbers of ranks, in all vector widths, and after a kill in the middle."""
+    folder, killed = plain.parent, plain.parent / "killed"
+    for ranks in all_ranks:
+        assert mpirun(ranks, command("input.toml", folder / str(ranks), output), cwd=folder).stderr == ""
+        assert differences(plain, folder / str(ranks)) == []
+    for width in WIDTHS[:-1]:
+        run(deck, folder / width, output, env=os.environ | {"CAROM_SIMD": width})
+        assert differences(plain, folder / width) == []
+    run(deck, killed, output, env=signalled(killer, killed, signal.SIGKILL, len(thermo(plain)["time"]) // 2), code=-signal.SIGKILL)
+    go_on(killed, ranks=2)
+    assert differences(plain, killed) == []
+    assert filecmp.cmp(plain / "thermo.csv", killed / "thermo.csv", shallow=False)
+
+
 @pytest.mark.parametrize("method, bath, accuracy",
                          [(method, "andersen", 0) for method in ("free-flight", "psa", "edda", "cva", "mcva", "cdda")] +
                          [(method, "rescaling", 0) for method in ("free-flight", "psa", "edda")] +
                          [("edda", "rescaling", 1e-4), ("cdda", "andersen", 1e-4)])
 def test_every_law_on_ranks_at_all_vector_widths_and_after_a_kill(method, bath, accuracy, killer, tmp_path):
     heated = LAWS | {"bath": [{"type": bath, "temperature": [1.0, 2.0], "rate": 0.5}]}
-    deck, plain, killed = write_deck(tmp_path, toml_text(heated)), tmp_path / "plain", tmp_path / "killed"
+    deck, plain = write_deck(tmp_path, toml_text(heated)), tmp_path / "plain"
     output = ["output.events=true", "output.checkpoint_wall=\"0\"", f"integrator.type={method}",
               "integrator.step=" + ("0.25" if method == "free-flight" else "0.02")]
     if accuracy:
@@ -85,16 +100,7 @@ def test_every_law_on_ranks_at_all_vector_widths_and_after_a_kill(method, bath, 
     if method in ("free-flight", "edda", "cdda"):
         assert energy["max_abs_error"] < 1e-12 * energy["reference"]
     by_place = method in ("free-flight", "psa", "edda")  # the other methods share the forces only
-    for ranks in (2, 3, 4) if by_place else (3,):
-        assert mpirun(ranks, command("input.toml", tmp_path / str(ranks), output), cwd=tmp_path).stderr == ""
-        assert differences(plain, tmp_path / str(ranks)) == []
-    for width in WIDTHS[:-1]:
-        run(deck, tmp_path / width, output, env=os.environ | {"CAROM_SIMD": width})
-        assert differences(plain, tmp_path / width) == []
-    run(deck, killed, output, env=signalled(killer, killed, signal.SIGKILL, len(thermo(plain)["time"]) // 2), code=-signal.SIGKILL)
-    go_on(killed, ranks=2)
-    assert differences(plain, killed) == []
-    assert filecmp.cmp(plain / "thermo.csv", killed / "thermo.csv", shallow=False)
+    expect_same_anywhere(deck, output, plain, killer, (2, 3, 4) if by_place else (3,))
 
 
 # Wells, a shoulder and tethered pairs in a mixture, with a Langevin bath and, except in free flight, with charges.
@@ -115,7 +121,7 @@ STEPS = tomllib.loads(SPHERES) | {
 @pytest.mark.parametrize("method", ["free-flight", "psa", "edda"])
 def test_steps_on_ranks_at_all_vector_widths_and_after_a_kill(method, killer, tmp_path):
     charges = [] if method == "free-flight" else [{"type": "coulomb", "form": "damped-shifted", "damping": 0.8, "cutoff": 2.5}]
-    plain, killed = tmp_path / "plain", tmp_path / "killed"
+    plain = tmp_path / "plain"
     position = chained_positions(240, 12.0)
     tied = STEPS | {"interaction": charges, "placement": {"type": "file", "file": "places.csv"}}
     (tmp_path / "places.csv").write_text("".join(",".join(map(repr, each)) + "\n" for each in position))
@@ -127,16 +133,7 @@ def test_steps_on_ranks_at_all_vector_widths_and_after_a_kill(method, killer, tm
     assert min(found["events"][name] for name in ("entered", "left", "bounced", "sphere_sphere")) > 50 and abs(found["energy"]["heat"]) > 1
     if method != "psa":
         assert found["energy"]["max_abs_error"] < 1e-12 * found["energy"]["reference"]
-    for ranks in (2, 3, 4):
-        assert mpirun(ranks, command("input.toml", tmp_path / str(ranks), output), cwd=tmp_path).stderr == ""
-        assert differences(plain, tmp_path / str(ranks)) == []
-    for width in WIDTHS[:-1]:
-        run(deck, tmp_path / width, output, env=os.environ | {"CAROM_SIMD": width})
-        assert differences(plain, tmp_path / width) == []
-    run(deck, killed, output, env=signalled(killer, killed, signal.SIGKILL, len(thermo(plain)["time"]) // 2), code=-signal.SIGKILL)
-    go_on(killed, ranks=2)
-    assert differences(plain, killed) == []
-    assert filecmp.cmp(plain / "thermo.csv", killed / "thermo.csv", shallow=False)
+    expect_same_anywhere(deck, output, plain, killer, (2, 3, 4))
 
 
 def test_a_number_of_collisions_next_to_steps(tmp_path):

@@ -147,6 +147,15 @@ std::unique_ptr<Simulation<D>> run_until(std::unique_ptr<System<D>> system, cons
   return run;
 }
 
+std::string message_of(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
 template <int D>
 double largest_difference(const std::vector<Vec<D>>& a, const std::vector<Vec<D>>& b) {
   double largest = 0;

@@ -2,6 +2,7 @@
 #pragma once
 // The systems that several tests run, and functions that run them.
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -57,6 +58,9 @@ std::unique_ptr<Simulation<D>> run_steps(std::unique_ptr<System<D>> system, cons
 template <int D>
 std::unique_ptr<Simulation<D>> run_until(std::unique_ptr<System<D>> system, const std::string& integrator, double h,
                                          double end_time, const Given& given = {});
+
+/// The message of the Error that `work` throws; empty if it throws none.
+std::string message_of(const std::function<void()>& work);
 
 /// The largest difference of any coordinate.
 template <int D>

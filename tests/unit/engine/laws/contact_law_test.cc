@@ -12,16 +12,7 @@
 namespace carom::contact_law_test {
 namespace {
 
-using test::set_law;
-
-std::string message_of(const auto& work) {
-  try {
-    work();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
+using test::message_of, test::set_law;
 
 TEST(ContactLaws, ImpulseGivesBackAFractionOfTheNormalSpeed) {
   ContactLaws laws;

@@ -159,19 +159,10 @@ TEST(Steps, RangesOfBondsDoNotDependOnTheirCores) {
   }
 }
 
-std::string refusal(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const Error& e) {
-    return e.what();
-  }
-  return "nothing is refused";
-}
-
 TEST(Steps, WhatCannotBeIsRefused) {
   const std::vector<std::string> all = {"*", "*"};
   const auto given = [](Parameters parameters) {
-    return refusal([&] {
+    return test::message_of([&] {
       auto system = square_well(0.2);
       system->box.steps = {};
       add(*system, parameters);
@@ -196,7 +187,7 @@ TEST(Steps, WhatCannotBeIsRefused) {
            {{{"pairs", PairList{{0, 1000}}}, {"tether", 1.2}}, "names particle 1000"},
            {{{"between", all}, {"range", 9.0}, {"depth", 1.0}}, "enlarge the box"}})
     EXPECT_NE(given(parameters).find(words), std::string::npos) << words << ": " << given(parameters);
-  EXPECT_NE(refusal([] {
+  EXPECT_NE(test::message_of([] {
               test::make_run<3>(square_well(0.2), "cva", {.step = 0.01, .end_time = 0.1})->run();
             }).find("take one of: "),
             std::string::npos);
