@@ -99,8 +99,8 @@ def random_forces(dice, method, dimension, boundary, species):
     return terms + dice.sample(pairs, dice.choice([1, 1, 2]))
 
 
-def random_walls(dice, boundary, end):
-    """Further walls, and faces that move or are shaken, by at most a tenth of a sphere during the run."""
+def random_walls(dice, boundary, end, length):
+    """Further walls, and faces that move or are shaken, by at most a tenth of a sphere during the run; `length`: the longest edge of the box."""
     walls, dimension = [], len(boundary)
     for axis, side in [(axis, side) for axis in range(dimension) if boundary[axis] == "wall" for side in "-+"]:
         if dice.random() < 0.3:
@@ -108,10 +108,21 @@ def random_walls(dice, boundary, end):
         motion = dice.choice([dice.uniform(-0.05, 0.05) / end, {"amplitude": dice.uniform(0, 0.05), "frequency": dice.uniform(0.1, 1.0)}])
         walls.append({"name": "xyz"[axis] + side, "velocity": motion})
         if dice.random() < 0.3:
+            walls[-1]["until"] = dice.uniform(0, 2) * end
+        if dice.random() < 0.3:
             walls[-1]["temperature"] = dice.uniform(0.3, 3.0)
     if "open" in boundary and dice.random() < 0.5:
         normal = [0.0 if kind == "periodic" else dice.gauss(0, 1) for kind in boundary]
         walls.append({"name": "far", "normal": normal, "offset": -30.0 * sum(abs(each) for each in normal)})
+    periodic = [kind == "periodic" for kind in boundary]
+    if "open" in boundary and sum(periodic) <= dimension - 2 and dice.random() < 0.5:  # a cavity around the box, or a tube along an axis of it
+        walls.append({"name": "cavity", "shape": "sphere", "centre": [length / 2] * dimension,
+                      "radius": dice.uniform(1.0, 1.2) * length * dimension**0.5 / 2 + 0.6})
+        if any(periodic) or dimension == 3 and dice.random() < 0.5:
+            axis = [1.0 if each else 0.0 for each in periodic] if any(periodic) else [dice.gauss(0, 1) for _ in boundary]
+            walls[-1] |= {"shape": "cylinder", "axis": axis}
+        if dice.random() < 0.3:
+            walls[-1]["temperature"] = dice.uniform(0.3, 3.0)
     return walls
 
 
@@ -199,7 +210,8 @@ def random_deck(dice, seconds):
     if bath and isinstance(bath["temperature"], list) and "collisions" in run:
         bath["temperature"] = bath["temperature"][0]
     walled = method != "verlet" and integrator.get("variant") != "restart" and dice.random() < 0.7
-    walls = random_walls(dice, boundary, end) if walled else []
+    length = (count * np.pi / (4 if dimension == 2 else 6) / packing)**(1 / dimension)
+    walls = random_walls(dice, boundary, end, length) if walled else []
     dissipates = method != "verlet" and dice.random() < 0.5
     contacts = random_contacts(dice, boundary, walls, [each["name"] for each in particles]) if dissipates else []
     if any("tangential" in law for law in contacts) and dice.random() < 0.7:

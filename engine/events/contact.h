@@ -4,7 +4,8 @@
 //
 // d = x_i − x_j is the separation of the centres (of the chosen image), v and a its derivatives, sigma = r_i + r_j the
 // contact distance. Times count from now. A contact is the first time at which the gap is not positive and decreasing:
-// spheres that overlap by rounding and separate do not collide, spheres that overlap and approach touch at once.
+// spheres that overlap by rounding and separate do not collide, spheres that overlap and approach touch at once. Pairs
+// in a well, and spheres in a round wall, leave at leaving_time().
 //
 //   const double s = contact_time(d, v, sigma, slack);            // straight flights
 //   const double s = contact_time(d, v, sigma, w, slack);         // straight flights of spheres that grow
@@ -101,6 +102,54 @@ double contact_time(const Vec<D>& d, const Vec<D>& v, const Vec<D>& a, double si
   const double falling = at.dot(v + s * a);
   if (falling < 0) {
     const double correction = 0.5 * (at.squaredNorm() - sigma * sigma) / falling;
+    if (std::abs(correction) < 1e-6 * s) s -= correction;
+  }
+  return s < time_left ? s : kNever;
+}
+
+/// The motion of a pair: d = x_i − x_j of the image that is near, v its velocity, and b = d·v; or the motion of a
+/// sphere in a round wall, relative to its centre.
+template <int D>
+struct PairMotion {
+  Vec<D> d, v;
+  double b = d.dot(v), distance = d.norm();
+};
+
+/// Straight relative motion: the first time at which |d + v s| is not below range − w s and grows relative to it. w ≥ 0
+/// is the rate at which the range shrinks: inside a wall, for a sphere that grows. The form of the root is that of
+/// contact_time(), with the opposite sign of w.
+template <int D>
+double leaving_time(const PairMotion<D>& motion, double range, double slack, double w = 0) {
+  const auto& [d, v, dv, distance] = motion;
+  const double b = dv + range * w, outrun = v.squaredNorm() - w * w, c = d.squaredNorm() - range * range;
+  if (outrun == 0 && b <= 0) return kNever;
+  if (c >= 0 && b >= 0) return b > slack ? 0.0 : (2 * slack - b) / outrun;  // on a tangent, until it clearly recedes
+  const double discriminant =
+      v.squaredNorm() * range * range - squared_cross<D>(d, v) + w * (w * d.squaredNorm() + 2 * range * dv);
+  const double root = std::sqrt(std::max(0.0, discriminant));
+  return b > 0 ? -c / (b + root) : (root - b) / outrun;
+}
+
+/// Parabolic relative motion d + v s + a s²/2: as above, in [0, time_left). `touching` divides out the root s = 0 of a
+/// pair that is at `range`.
+template <int D>
+double leaving_time(const PairMotion<D>& motion, const Vec<D>& a, double range, double time_left, bool touching,
+                    double slack) {
+  const auto& [d, v, b, distance] = motion;
+  const double c0 = range * range - d.squaredNorm();
+  const Polynomial<4> room{{c0, -2 * b, -v.squaredNorm() - d.dot(a), -v.dot(a), -0.25 * a.squaredNorm()}};
+  double s;
+  if (touching) {
+    if (b > slack) return 0;
+    s = first_fall(Polynomial<3>{{b >= -slack ? 0.0 : -2 * b, room.c[2], room.c[3], room.c[4]}}, time_left);
+  } else {
+    s = first_fall(room, time_left);
+  }
+  if (s == 0 || s == kNever) return s;
+  const Vec<D> at = d + s * v + (0.5 * s * s) * a;  // a Newton step on the vectors themselves
+  const double rising = at.dot(v + s * a);
+  if (rising > 0) {
+    const double correction = 0.5 * (at.squaredNorm() - range * range) / rising;
     if (std::abs(correction) < 1e-6 * s) s -= correction;
   }
   return s < time_left ? s : kNever;

@@ -159,7 +159,7 @@ double Flights<D>::wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall)
     throw Error(Failure::numerical, "the speed of particle " + std::to_string(r.id) +
                                         " is too large: its square is no number; give smaller velocities, "
                                         "temperatures and accelerations");
-  const bool approaches = wall.opening(r.v, r.t) - rate < -slack;
+  const bool approaches = s == 0 && wall.at(r.x).opening(r.v, r.t) - rate < -slack;
   if (s == 0 && !approaches && !wall.thermal())
     throw Error(Failure::numerical,
                 "particle " + std::to_string(r.id) + " rests on " + box_.wall_name(wall.number) +
@@ -256,8 +256,8 @@ EventResult<D> Flights<D>::meet_alone(const EventKey<D>& key, Slot i, Record<D>&
   }
   const Wall<D> wall = box_.wall(key.hi);
   const auto [after, impulse, exchange] =
-      wall_impulse<D>(laws(), wall, before, {m, at_contact, r.species, has_internal_ ? internal : nullptr}, draw, t,
-                      radius(i) * growth_);
+      wall_impulse<D>(laws(), wall.at(r.x), before, {m, at_contact, r.species, has_internal_ ? internal : nullptr},
+                      draw, t, radius(i) * growth_);
   r.v = after;
   return {r.x - wall.foot(r.x, t), impulse, exchange, -wall.gap(r.x, at_contact, t) / at_contact, at_contact};
 }

@@ -16,6 +16,25 @@
 
 namespace carom {
 
+/// wall_meeting() of a round wall: the sphere meets the centre, or a point of the axis, at the distance reach(), from
+/// the inside or from the outside. Spheres grow only where they fly straight.
+template <int D, class Slack>
+[[gnu::noinline]] double round_wall_meeting(const Wall<D>& wall, const Vec<D>& x, const Vec<D>& v, const Vec<D>& a,
+                                            double radius, double rate, double time_left, double tolerance,
+                                            Slack&& slack) {
+  const PairMotion<D> motion{wall.from_centre(x), wall.across(v)};
+  const Vec<D> bend = wall.across(a);
+  const double reach = wall.reach(radius);
+  const bool touching = wall.gap(x, radius) <= tolerance;
+  const double least = touching ? reach * slack() : 0.0;
+  if (!bend.isZero(0))
+    return wall.inside ? leaving_time(motion, bend, reach, time_left, touching, least)
+                       : contact_time<D>(motion.d, motion.v, bend, reach, time_left, touching, least);
+  const double s =
+      wall.inside ? leaving_time(motion, reach, least, rate) : contact_time<D>(motion.d, motion.v, reach, rate, least);
+  return s < time_left ? s : kNever;
+}
+
 /// The time, from t on and before `time_left`, until a sphere that moves on x + v s + a s²/2 meets a wall, while its
 /// radius grows at `rate`: from the front or, if it is on its way through a one-way wall, when it has come back. A gap
 /// up to `tolerance` touches; `slack()` returns the largest speed of approach that rounding alone can cause for a
@@ -23,6 +42,8 @@ namespace carom {
 template <int D, class Slack>
 double wall_meeting(const Wall<D>& wall, const Vec<D>& x, const Vec<D>& v, const Vec<D>& a, double radius, double rate,
                     double t, double time_left, double tolerance, Slack&& slack) {
+  if (wall.round > 0) [[unlikely]]
+    return round_wall_meeting(wall, x, v, a, radius, rate, time_left, tolerance, slack);
   const double gap = wall.gap(x, radius, t), opening = wall.opening(v, t) - rate, speeding = wall.speeding(a);
   if (wall.one_way && !(gap < kNever)) return return_time(wall.clearance(x, radius, t), opening, speeding, time_left);
   const bool touching = gap <= tolerance;
@@ -109,8 +130,9 @@ struct WallImpulse {
   Exchange exchange;
 };
 
-/// A contact at time t of a sphere with velocity v with a wall, while its radius grows at `rate`. Its internal state
-/// may change; `draw` matters for thermal walls only.
+/// A contact at time t of a sphere with velocity v with a wall, as it is where the sphere touches it (Wall::at()),
+/// while the radius of the sphere grows at `rate`. Its internal state may change; `draw` matters for thermal walls
+/// only.
 template <int D>
 WallImpulse<D> wall_impulse(const ContactLaws& laws, const Wall<D>& wall, const Vec<D>& v, const Partner<D>& a,
                             const Draw& draw, double t = 0, double rate = 0) {
@@ -156,7 +178,8 @@ double resolve_contact(const EventKey<D>& key, const Vec<D>& d, const Box<D>& bo
   };
   if (key.kind == EventKind::wall) {
     const Draw draw{.id = p.id_of(lo), .time = box.time, .number = key.generation};
-    const auto [after, impulse, exchange] = wall_impulse<D>(box.contacts, box.wall(hi), p.v[lo], partner(lo, 0), draw);
+    const auto [after, impulse, exchange] =
+        wall_impulse<D>(box.contacts, box.wall(hi).at(p.x[lo]), p.v[lo], partner(lo, 0), draw);
     p.v[lo] = after;
     store(lo, 0);
     return exchange.dissipated;

@@ -15,13 +15,6 @@
 
 namespace carom {
 
-/// The motion of a pair: d = x_i − x_j of the image that is near, v its velocity, and b = d·v.
-template <int D>
-struct PairMotion {
-  Vec<D> d, v;
-  double b = d.dot(v), distance = d.norm();
-};
-
 /// A pair that has just met is within this distance of what it met, relative to the contact distance: far more than the
 /// rounding of a place, and a tenth of Steps::kLeastSeparation.
 inline constexpr double kJustMet = 1e-7;
@@ -54,42 +47,6 @@ std::size_t steps_passed(const PairSteps& steps, const PairMotion<D>& motion, do
 /// Pairs that are nearer to a step, relative to the square of its distance, are looked at more closely: far more than
 /// the tolerance and than rounding, and few pairs.
 inline constexpr double kNearStep = 1e-9;
-
-/// Straight relative motion: the first time at which |d + v s| is not below `range` and grows.
-template <int D>
-double leaving_time(const PairMotion<D>& motion, double range, double slack) {
-  const auto& [d, v, b, distance] = motion;
-  const double v2 = v.squaredNorm(), c = d.squaredNorm() - range * range;
-  if (v2 == 0) return kNever;
-  if (c >= 0 && b >= 0) return b > slack ? 0.0 : (2 * slack - b) / v2;  // on a tangent, until it clearly recedes
-  const double root = std::sqrt(std::max(0.0, v2 * range * range - squared_cross<D>(d, v)));
-  return b > 0 ? -c / (b + root) : (root - b) / v2;
-}
-
-/// Parabolic relative motion d + v s + a s²/2: as above, in [0, time_left). `touching` divides out the root s = 0 of a
-/// pair that is at `range`.
-template <int D>
-double leaving_time(const PairMotion<D>& motion, const Vec<D>& a, double range, double time_left, bool touching,
-                    double slack) {
-  const auto& [d, v, b, distance] = motion;
-  const double c0 = range * range - d.squaredNorm();
-  const Polynomial<4> room{{c0, -2 * b, -v.squaredNorm() - d.dot(a), -v.dot(a), -0.25 * a.squaredNorm()}};
-  double s;
-  if (touching) {
-    if (b > slack) return 0;
-    s = first_fall(Polynomial<3>{{b >= -slack ? 0.0 : -2 * b, room.c[2], room.c[3], room.c[4]}}, time_left);
-  } else {
-    s = first_fall(room, time_left);
-  }
-  if (s == 0 || s == kNever) return s;
-  const Vec<D> at = d + s * v + (0.5 * s * s) * a;  // a Newton step on the vectors themselves
-  const double rising = at.dot(v + s * a);
-  if (rising > 0) {
-    const double correction = 0.5 * (at.squaredNorm() - range * range) / rising;
-    if (std::abs(correction) < 1e-6 * s) s -= correction;
-  }
-  return s < time_left ? s : kNever;
-}
 
 /// The time until a pair with straight relative motion reaches its core or a step. `slack()` as in wall_meeting().
 template <int D, class Slack>

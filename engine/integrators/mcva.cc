@@ -190,7 +190,8 @@ class ModifiedCollisionVerlet : public Integrator<D> {
     const auto partner = [&](Id i) { return Partner<D>{p.mass[i], p.radius[i], p.species[i]}; };
     if (touch.pair())
       return pair_impulse<D>(system.box.contacts, touch.normal, p.v[lo] - p.v[hi], partner(lo), partner(hi));
-    const auto bounced = wall_impulse<D>(system.box.contacts, system.box.wall(hi), p.v[lo], partner(lo), {});
+    const auto bounced =
+        wall_impulse<D>(system.box.contacts, system.box.wall(hi).at(p.x[lo]), p.v[lo], partner(lo), {});
     return {.factor = bounced.exchange.impulse, .dissipated = bounced.exchange.dissipated};
   }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/laws/box.h"
 
+#include <numbers>
+
 #include "engine/laws/wall_options.h"
 
 namespace carom {
@@ -18,6 +20,23 @@ std::vector<std::string> face_names() {
   return names;
 }
 
+/// Checks a round wall, and makes its direction a unit vector.
+template <int D>
+void check_round(const Box<D>& box, WallOptions<D>& wall, const auto& refuse) {
+  if (wall.normal != Vec<D>::Zero() || wall.offset != 0)
+    refuse("is round and has the normal or the offset of a plane", "leave these out");
+  if (wall.moves()) refuse("is round and moves, which only planes do", "leave velocity and moved out");
+  if (!wall.one_sided || wall.one_way)
+    refuse("is round and lets spheres be on both sides",
+           "leave one_sided and one_way out, and take two walls, inside = true and inside = false");
+  if (const double length = wall.direction.norm(); length > 0) wall.direction /= length;
+  for (int k = 0; k < D; ++k)
+    if (box.periodic(k) && std::abs(wall.direction[k]) != 1)
+      refuse("is round, and axis " + std::to_string(k) + " of the box is periodic",
+             D == 2 ? "make that boundary wall or open"
+                    : "make that boundary wall or open; only a cylinder along the axis can be periodic");
+}
+
 }  // namespace
 
 template <int D>
@@ -28,8 +47,9 @@ void Box<D>::add(WallOptions<D> wall) {
   const auto faces = face_names<D>();
   const auto face = std::ranges::find(faces, wall.name);
   const double length = wall.normal.norm();
+  if (!(wall.until >= 0)) refuse("moves until a time that is negative or no number", "give a time since the start");
   if (!std::isfinite(length + wall.offset + wall.velocity + wall.amplitude + wall.frequency + wall.temperature +
-                     wall.moved + wall.turns))
+                     wall.moved + wall.turns + wall.round + wall.centre.sum() + wall.direction.sum()))
     refuse("has a number that is not finite", "give finite ones");
   if (std::ranges::find(options, wall.name, &WallOptions<D>::name) != options.end())
     refuse("is given twice", "give each wall its own name");
@@ -45,24 +65,39 @@ void Box<D>::add(WallOptions<D> wall) {
     if (!walled(static_cast<int>(wall.number / 2)))
       refuse("does not exist, because that boundary is " + std::string(find_boundary(boundary[wall.number / 2]).name),
              "make that boundary a wall");
-    if (length > 0 || wall.offset != 0 || !wall.one_sided)
+    if (length > 0 || wall.offset != 0 || !wall.one_sided || wall.round > 0)
       refuse("is a face of the box, which has its normal, its place and one side",
-             "leave normal, offset and one_sided out, or choose another name");
+             "leave shape, normal, offset and one_sided out, or choose another name");
   } else {
-    if (!(length > 0)) {
+    if (wall.round > 0)
+      check_round(*this, wall, refuse);
+    else if (!(length > 0)) {
       std::string known;
       for (int k = 0; k < D; ++k)
         if (walled(k)) known += (known.empty() ? "" : ", ") + faces[2 * k] + ", " + faces[2 * k + 1];
       refuse("is no face of the box and has no normal",
              "give a normal that is not zero" + (known.empty() ? known : ", or the name of a face: " + known));
     }
-    wall.normal /= length;
-    wall.offset /= length;
+    if (length > 0) {
+      wall.normal /= length;
+      wall.offset /= length;
+    }
     wall.number = 2 * D;
     for (const WallOptions<D>& each : options)
       if (each.number >= 2 * D) wall.number = each.number + (each.one_sided ? 1 : 2);
   }
   options.push_back(std::move(wall));
+}
+
+template <int D>
+double Box<D>::area(const Wall<D>& wall, double at) const {
+  const Vec<D> length = lengths(at);
+  if (wall.axis >= 0) return length.prod() / length[wall.axis];
+  const double girth = 2 * std::numbers::pi * wall.round;
+  if (D == 2 || wall.direction.isZero(0)) return D == 2 ? girth : 2 * girth * wall.round;
+  for (int k = 0; k < D; ++k)
+    if (std::abs(wall.direction[k]) == 1) return girth * length[k];
+  return 0;
 }
 
 template <int D>
@@ -81,9 +116,20 @@ std::vector<Wall<D>> Box<D>::walls() const {
 /// Sets where the wall is and how it moves. In a step of length h a shaken wall moves on a parabola. That of an
 /// oscillator with the acceleration −Ω²(X + X')/2, where X and X' are its positions at the two ends and Ω =
 /// (2/h)·tan(πfh), has the positions of the sine at the ends of all steps and a continuous velocity, of order 2. Where
-/// spheres fly straight, it moves straight too: a sphere that is carried along neither sinks in nor gets ahead.
+/// spheres fly straight, it moves straight too: a sphere that is carried along neither sinks in nor gets ahead. So it
+/// does in the step in which its motion ends; in free flight an epoch ends then.
 template <int D>
 void Box<D>::set_motion(const WallOptions<D>& its, Wall<D>& wall) const {
+  if (its.rests(step_start)) {
+    wall.offset += its.displacement(time);
+    return;
+  }
+  if (its.until < step_start + step) {  // straight, to where it stops
+    const double from = its.displacement(step_start);
+    wall.velocity = (its.displacement(step_start + step) - from) / step;
+    wall.offset += from + (time - step_start) * wall.velocity;
+    return;
+  }
   if (its.amplitude == 0) {
     wall.offset += its.displacement(time);
     wall.velocity = its.velocity;
@@ -132,7 +178,7 @@ void Box<D>::check(Failure failure) const {
       throw Error(failure, wall_name(each.number) + " is shaken with the period " + short_text(1 / each.frequency) +
                                ", too short for steps of " + short_text(step) + "; take a step of at most " +
                                short_text(kLongestStep / each.frequency));
-  if (const std::string cramped = no_room(*this, 0, 0); !cramped.empty()) throw Error(failure, cramped);
+  if (const std::string cramped = no_room(*this, 0); !cramped.empty()) throw Error(failure, cramped);
 }
 
 template <int D>

@@ -35,19 +35,29 @@ struct WallOptions {
   double temperature = 0;  ///< a thermal wall has one [energy]; 0: the wall is not thermal
   std::uint64_t seed = 1;  ///< seed of the random numbers of a thermal wall
   double moved = 0;        ///< displacement before time 0, of the centre of a sine [length]
-  Id number = 0;           ///< set by add(); the rear of a wall with two sides has the next number
+  double until = std::numeric_limits<double>::infinity();  ///< when its motion ends, since time 0
+  double round = 0;    ///< radius of a sphere or, if `direction` is not zero, of a cylinder; 0: a plane [length]
+  bool inside = true;  ///< the spheres are inside a round wall; false: outside
+  Vec<D> centre = Vec<D>::Zero();     ///< of a round wall; of a cylinder: any point of its axis [length]
+  Vec<D> direction = Vec<D>::Zero();  ///< along the axis of a cylinder; any length
+  Id number = 0;                      ///< set by add(); the rear of a wall with two sides has the next number
 
   /// Whether it moves or has moved.
   bool moves() const { return velocity != 0 || amplitude != 0 || moved != 0; }
   /// How far it has moved along its normal.
   double displacement(double time) const {
+    time = std::min(time, until);
     const double smooth = moved + velocity * time;
     return amplitude == 0 ? smooth : smooth + amplitude * cosine_and_sine(turns + frequency * time)[1];
   }
+  /// Whether its motion is over; the rounding of the sum of the lengths of slabs does not matter.
+  bool rests(double time) const { return time >= until * (1 - 1e-12); }
   /// Makes `time` its time 0: it stays where it is and goes on as it moves.
   void restart(double time) {
-    moved += velocity * time;
-    if (amplitude != 0) turns = std::fmod(turns + frequency * time, 1.0);
+    const double moving = std::min(time, until);
+    moved += velocity * moving;
+    if (amplitude != 0) turns = std::fmod(turns + frequency * moving, 1.0);
+    until -= moving;
   }
 };
 
@@ -105,6 +115,10 @@ struct Box {
       wall.normal = its->normal;
       wall.offset = its->offset;
       wall.one_sided = its->one_sided;
+      wall.round = its->round;
+      wall.inside = its->inside;
+      wall.centre = its->centre;
+      wall.direction = its->direction;
       if ((wall.one_way = its->one_way)) wall.depth = 1e3 * gap_tolerance()(0);
     }
     if (!its) return wall;
@@ -120,12 +134,22 @@ struct Box {
     }
     return wall;
   }
+  /// The area of a wall at a time: of a face of the box, of a sphere, of a cylinder along an axis of the box; 0: it has
+  /// none [length^(D−1)].
+  double area(const Wall<D>& wall, double at) const;
   /// All walls, ordered by number.
   std::vector<Wall<D>> walls() const;
   /// Call this at the start of a slab. `length`: of the step of a stepping method, else 0.
   void begin_step(double start, double length) {
     time = step_start = start;
     step = length;
+  }
+  /// When the motion of a wall ends that still moves at this time; infinite if none does.
+  double next_end(double at) const {
+    double next = std::numeric_limits<double>::infinity();
+    for (const WallOptions<D>& each : options)
+      if (each.moves() && !each.rests(at)) next = std::min(next, each.until);
+    return next;
   }
   /// The longest step that the walls allow; infinite if none is shaken [time].
   double longest_step() const;

@@ -14,9 +14,10 @@ const std::vector<Parameter>& wall_parameters();
 template <int D>
 void add_wall(Box<D>& box, const Parameters& given, std::uint64_t seed = 1);
 
-/// Two parallel walls that leave less room than this diameter between them at a time of the slab, for messages; empty
-/// if there are none. Walls with spheres behind them count for a diameter of 0 only.
+/// A sphere or cylinder that is too small for this diameter, or two parallel walls that leave less room than it
+/// between them now, for messages; empty if there are none. Walls with spheres behind them count for
+/// a diameter of 0 only.
 template <int D>
-std::string no_room(const Box<D>& box, double diameter, double after);
+std::string no_room(const Box<D>& box, double diameter);
 
 }  // namespace carom

@@ -417,14 +417,12 @@ template <int D>
 std::vector<WallLoad> Monitor<D>::wall_loads(double time) {
   std::vector<WallLoad> loads;
   const double elapsed = account_.last_row >= 0 ? time - account_.last_row : 0;  // no force before the start
-  const Vec<D> lengths = system_.box.lengths(time);
   const std::vector<WallTally>& tallies = statistics_.counters.walls;
   for (const Wall<D>& wall : system_.box.walls()) {
     const double impulse = wall.number < tallies.size() ? tallies[wall.number].impulse.value() : 0;
     if (last_row_impulses_.size() <= wall.number) last_row_impulses_.resize(wall.number + 1);
     const double since = impulse - std::exchange(last_row_impulses_[wall.number], impulse);
-    loads.push_back(
-        {wall.number, elapsed > 0 ? since / elapsed : 0, wall.axis >= 0 ? lengths.prod() / lengths[wall.axis] : 0});
+    loads.push_back({wall.number, elapsed > 0 ? since / elapsed : 0, system_.box.area(wall, time)});
   }
   return loads;
 }

@@ -295,6 +295,10 @@ void Simulation<D>::run(const Hooks& hooks) {
     }
     if (done) break;
     Slab slab = clock_.next_slab(s);
+    if (const double left = system_->box.next_end(slab.start) - slab.start; !info_.stepping && left < slab.length) {
+      slab.length = left;
+      slab.ends_step = false;
+    }
     s.counters.divisions += system_->decomposition.divide_if_due(slab.index, slab.length);
     const std::vector<double> due = info_.stepping ? std::vector<double>{} : monitor_->due_within(slab);
     contacts.clear();
@@ -343,8 +347,8 @@ bool Simulation<D>::fly(Slab& slab, SlabReport<D>& report, SlabWatch& watch) {
   Decomposition<D>& decomposition = system_->decomposition;
   const double diameter = info_.hard_cores && !system_->box.plain() ? 2 * largest_radius(*system_) : 0;
   const auto no_room_text = [&](double after) {
-    system_->box.begin_step(slab.start, info_.stepping ? slab.length : 0);
-    return diameter > 0 ? no_room(system_->box, diameter, after) : "";
+    system_->box.begin_step(slab.start + after, 0);
+    return diameter > 0 ? no_room(system_->box, diameter) : "";
   };
   const auto error = [&](const std::string& what) {
     return Error(Failure::numerical,

@@ -74,8 +74,8 @@ std::array<double, 2> ramp_times(const Plan& plan, std::int64_t start_step, doub
 struct WallLoad {
   Id number = 0;
   double force = 0;  ///< mean force on the spheres, along the normal [force]
-  double area = 0;   ///< of a face of the box [length^(D−1)]; 0 for a further wall
-  /// The pressure on a face of the box [energy/length^D], the force on a further wall.
+  double area = 0;   ///< Box::area() [length^(D−1)]
+  /// The pressure on a wall with an area [energy/length^D], the force on others.
   double load() const { return area > 0 ? force / area : force; }
 };
 

@@ -84,8 +84,9 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
       if (gap > std::max(tolerance(particles_.radius[i]), widest_)) continue;
       key.lo = i;
       key.hi = wall.number;
-      if (widest_ > 0 && gap > noticed_gap(key, wall.normal)) continue;
-      note(key, wall.normal, gap, particles_.radius[i], wall.velocity);
+      const Vec<D> normal = wall.at(x[i]).normal;
+      if (widest_ > 0 && gap > noticed_gap(key, normal)) continue;
+      note(key, normal, gap, particles_.radius[i], wall.velocity);
     }
   }
   std::ranges::sort(touching_, {}, &Touch<D>::key);
@@ -222,7 +223,7 @@ void ContactScan<D>::record(const Touch<D>& touch, Positions<D> x, Positions<D> 
   } else {
     const Wall<D> wall = box_.wall(hi);
     contact.x_hi = wall.foot(x[lo]);
-    contact.exchange.impulse = wall.along_normal(impulse);
+    contact.exchange.impulse = wall.at(x[lo]).along_normal(impulse);
     contact.exchange.work = wall.work(impulse);
     if (wall.thermal()) contact.exchange.heat = gained - contact.exchange.work;
   }
@@ -303,7 +304,15 @@ double ContactScan<D>::least_opening(const RestingContact<D>& contact, Positions
   const auto closing = [&](double opening) { return time_left > 0 ? -2 * std::max(0.0, opening) / time_left : 0; };
   if (key.kind != EventKind::pair) {
     const Wall<D> wall = box_.wall(key.hi);
-    return wall.acceleration + closing(wall.opening(v[key.lo], 0));
+    double bend = 0;
+    if (wall.round > 0) {  // as for a pair; inside, the terms have the other sign, and the one with a² counts
+      const Vec<D> u = wall.across(v[key.lo]), b = wall.across(a[key.lo]);
+      const double turn = (wall.inside ? 1 : -1) * u.dot(b) * time_left;
+      bend = std::max(0.0, turn) +
+             (wall.inside ? u.squaredNorm() + 0.25 * b.squaredNorm() * time_left * time_left : -u.squaredNorm());
+      bend /= wall.reach(particles_.radius[key.lo]);
+    }
+    return wall.acceleration + bend + closing(contact.normal.dot(v[key.lo]) - wall.velocity_at(0));
   }
   const Vec<D> u = v[key.lo] - v[key.hi];
   return std::max(0.0, -u.dot(a[key.lo] - a[key.hi])) * time_left - u.squaredNorm() + closing(contact.normal.dot(u));
@@ -318,6 +327,9 @@ bool ContactScan<D>::hold_means(Positions<D> x, Positions<D> w_before, Vectors<D
     const double sigma = pair ? contact_distance(lo, hi) : particles_.radius[lo];
     const double gap = pair ? contact.normal.norm() - sigma : box_.wall(hi).gap(x[lo], sigma);
     if (pair) contact.normal = 2 * contact.normal + length * (w_before[lo] - w_before[hi]);
+    if (!pair)
+      if (const Wall<D> wall = box_.wall(hi); wall.round > 0)
+        contact.normal += 0.5 * length * wall.curvature(x[lo]) * wall.across(w_before[lo]);
     if (length < 0) contact.normal = -contact.normal;
     contact.bound = pair ? 0.0 : length < 0 ? -mean_speed(hi, length) : mean_speed(hi, length);
     contact.slack = 0.125 * normal_slack(contact, w_before);  // about 30 ε of the speeds, as good as a new solution
@@ -459,7 +471,7 @@ Touch<D> ContactScan<D>::earliest(Positions<D> x, Positions<D> v, Positions<D> a
       key.hi = wall.number;
       key.time = wall_meeting<D>(wall, x[i], v[i], a[i], radius, 0, 0, time_left, tolerance(radius),
                                  [&] { return rounding_speed(key, v); });
-      if (key.time < kNever) offer(wall.normal);
+      if (key.time < kNever) offer(wall.at(x[i]).normal);
     }
   }
   // Pieces that end in a contact without an impulse count too, so that their number is limited.

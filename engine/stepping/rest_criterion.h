@@ -73,7 +73,7 @@ EventKey<D> without_time(EventKey<D> key) {
 /// The gradient of the gap of a contact at x, up to a positive factor.
 template <int D>
 Vec<D> contact_normal(const Box<D>& box, const EventKey<D>& key, Positions<D> x) {
-  if (key.kind == EventKind::wall) return box.wall(key.hi).normal;
+  if (key.kind == EventKind::wall) return box.wall(key.hi).at(x[key.lo]).normal;
   return x[key.lo] - x[key.hi] + box.shift(key.image);
 }
 

@@ -371,7 +371,7 @@ template <int D>
 struct SlabCore<D>::Meeting {
   Meeting(const SlabCore& core, const EventKey<D>& key) : v_lo(core.velocity(key.lo, key.time)) {
     if (key.kind == EventKind::wall) {
-      const Wall<D> wall = core.box_.wall(key.hi);
+      const Wall<D> wall = core.box_.wall(key.hi).at(core.position(key.lo, key.time));
       normal = wall.normal;
       speed = wall.opening(v_lo, key.time);
       sigma = core.particles_.radius[key.lo];
@@ -420,8 +420,14 @@ bool SlabCore<D>::at_the_end(const EventKey<D>& key) const {
   const Meeting meeting(*this, key);
   const double most = 0.25 * scan_->tolerance(meeting.sigma), time_left = length_ - key.time;
   const Vec<D> a = acceleration(key.lo);
-  const double gap_acceleration =
-      pair ? meeting.normal.dot(a - acceleration(key.hi)) / meeting.normal.norm() : box_.wall(key.hi).speeding(a);
+  double gap_acceleration = 0;
+  if (pair) {
+    gap_acceleration = meeting.normal.dot(a - acceleration(key.hi)) / meeting.normal.norm();
+  } else {
+    const Wall<D> wall = box_.wall(key.hi);
+    const Vec<D> x = position(key.lo, key.time);
+    gap_acceleration = wall.at(x).speeding(a) + wall.curvature(x) * wall.across(meeting.v_lo).squaredNorm();
+  }
   if (time_left * (0.5 * time_left * std::max(0.0, -gap_acceleration) - meeting.speed) > most) return false;
   EventKey<D> at_end = key;
   at_end.time = length_;
@@ -486,7 +492,7 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     if (!(far <= margin_)) note_path(far);
   };
   if (key.kind == EventKind::wall) {
-    const Wall<D> wall = box_.wall(key.hi);
+    const Wall<D> wall = box_.wall(key.hi).at(lo.x);
     if (!(wall.opening(lo.v, key.time) < 0) && !wall.thermal()) return;
     // Sweeps change the time of a contact, not its random numbers.
     const Draw draw{.id = particles_.id_of(key.lo), .time = box_.time, .number = std::uint64_t{lo.version} << 32};

@@ -88,26 +88,33 @@ void write_parameters(File& file, const Deck& deck, const System<D>& system) {
 }
 
 /// The walls that are more than fixed faces of the box; `motion` of each: normal·x without motion, velocity, amplitude,
-/// frequency and phase of a sine.
+/// frequency and phase of a sine, when it ends. If some are round, `shape` of each: the radius, which is 0 for a plane,
+/// the centre, the unit vector along a cylinder, 1 if the spheres are inside, else 0.
 template <int D>
 void write_walls(File& file, const Box<D>& box) {
   if (box.options.empty()) return;
   std::vector<std::string> names;
   std::vector<Vec<D>> normals;
-  std::vector<double> motion;
+  std::vector<double> motion, shape;
   Box<D> still = box;
   for (WallOptions<D>& each : still.options) each.velocity = each.amplitude = 0;
   for (const WallOptions<D>& each : box.options) {
     const Wall<D> wall = still.wall(each.number);
     names.push_back(each.name);
     normals.push_back(wall.normal);
-    motion.insert(motion.end(), {wall.offset, each.velocity, each.amplitude, each.frequency, each.turns});
+    motion.insert(motion.end(), {wall.offset, each.velocity, each.amplitude, each.frequency, each.turns, each.until});
+    const std::vector<double> place = three_columns<double>(std::vector{each.centre, each.direction}, D);
+    shape.push_back(each.round);
+    shape.insert(shape.end(), place.begin(), place.end());
+    shape.push_back(each.inside ? 1 : 0);
   }
   const Handle group = file.group("parameters/walls");
   file.write_texts(group, "name", names);
   file.write_array(group, "normal", hdf5::native_type<double>(), three_columns<double>(normals, D).data(),
                    {names.size(), 3});
-  file.write_array(group, "motion", hdf5::native_type<double>(), motion.data(), {names.size(), 5});
+  file.write_array(group, "motion", hdf5::native_type<double>(), motion.data(), {names.size(), 6});
+  if (std::ranges::any_of(box.options, [](const auto& each) { return each.round > 0; }))
+    file.write_array(group, "shape", hdf5::native_type<double>(), shape.data(), {names.size(), 8});
 }
 
 /// The radius of a species: the mean of its particles, exact if all have the same radius.

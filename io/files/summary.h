@@ -16,17 +16,14 @@ namespace carom {
 struct WallRecord {
   Id number = 0;
   std::string name;
-  double area = 0;  ///< area of a face of the box at the end of the run [length^(D−1)]; 0: a further wall
+  double area = 0;  ///< Box::area() at the end of the run [length^(D−1)]
 
   /// The walls of a box.
   template <int D>
   static std::vector<WallRecord> all(const Box<D>& box) {
     std::vector<WallRecord> records;
-    for (const Wall<D>& wall : box.walls()) {
-      Vec<D> lengths = box.lengths(box.time);
-      if (wall.axis >= 0) lengths[wall.axis] = 1;
-      records.push_back({wall.number, box.name_of(wall.number), wall.axis < 0 ? 0 : lengths.prod()});
-    }
+    for (const Wall<D>& wall : box.walls())
+      records.push_back({wall.number, box.name_of(wall.number), box.area(wall, box.time)});
     return records;
   }
 };

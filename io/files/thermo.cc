@@ -72,9 +72,9 @@ std::string columns_page() {
     text += fmt::format("    {}{} [{}]: {}\n", column.name, column.components() > 1 ? "_x, _y, _z" : "", column.unit,
                         column.meaning);
   text +=
-      "    pressure_x-, … [energy/length^D]: mean force per area on a face of the box that is a wall, since the last "
-      "row\n";
-  text += "    force_NAME [energy/length]: mean force on a further wall, since the last row\n";
+      "    pressure_x-, … [energy/length^D]: mean force per area on a face of the box that is a wall, a sphere or a "
+      "cylinder, since the last row\n";
+  text += "    force_NAME [energy/length]: mean force on a further plane, since the last row\n";
   return text;
 }
 
@@ -98,7 +98,7 @@ ThermoWriter<D>::ThermoWriter(const std::filesystem::path& path, const Box<D>& b
     : file_(path, mark) {
   std::vector<std::string> names;
   for (const Wall<D>& wall : box.walls()) {
-    std::string name = (wall.axis >= 0 ? "pressure_" : "force_") + box.name_of(wall.number);
+    std::string name = (box.area(wall, box.time) > 0 ? "pressure_" : "force_") + box.name_of(wall.number);
     std::ranges::replace_if(
         name, [](char c) { return c == ',' || c == '"' || c == '\n' || c == '\r'; }, '_');
     const auto known = std::ranges::find(names, name);

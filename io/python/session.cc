@@ -248,6 +248,7 @@ std::vector<ValueTable> Session<D>::tables(const std::string& name) const {
     now.restart(present());
     all[k].values.set("moved", now.moved);
     all[k].values.set("phase", now.turns);
+    if (all[k].values.has("until")) all[k].values.set("until", now.until);
   }
   const Bath& bath = (at_work_ ? at_work_->box : box_).bath;
   if (name == "bath" && bath.has_ramp() && !bath.needs_ramp_time())
@@ -286,7 +287,7 @@ void Session<D>::set_wall(Parameters given) {
   if (old == all.end()) {
     all.push_back(table_of("wall", std::move(given)));
   } else {
-    for (const char* const fixed : {"normal", "offset"})
+    for (const char* const fixed : {"shape", "normal", "offset", "centre", "axis", "radius", "inside"})
       if (given.has(fixed))
         refuse("the wall '" + *name + "' is there already and stays where it is; leave '" + fixed +
                "' out, or give 'moved'");

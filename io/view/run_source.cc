@@ -83,18 +83,22 @@ std::string rows_from(const std::filesystem::path& path, std::uint64_t first) {
   return text;
 }
 
-/// Name, normal and motion of each wall that is more than a fixed face of the box.
+/// Name, normal, motion and shape of each wall that is more than a fixed face of the box.
 Json walls_of(const hdf5::File& file) {
   Json walls = Json::array();
   if (!hdf5::exists(file, "/parameters/walls")) return walls;
   const auto names = hdf5::texts(file, "/parameters/walls/name");
   const auto normal = hdf5::numbers<double>(file, "/parameters/walls/normal"),
              motion = hdf5::numbers<double>(file, "/parameters/walls/motion");
-  const std::size_t columns = names.empty() ? 0 : motion.size() / names.size();  // 4 in files of earlier versions
-  for (std::size_t n = 0; n < names.size(); ++n)
+  std::vector<double> shape;
+  if (hdf5::exists(file, "/parameters/walls/shape")) shape = hdf5::numbers<double>(file, "/parameters/walls/shape");
+  const std::size_t columns = names.empty() ? 0 : motion.size() / names.size();  // 4 or 5 in files of earlier versions
+  for (std::size_t n = 0; n < names.size(); ++n) {
     walls.push_back({{"name", names[n]},
                      {"normal", std::vector<double>(&normal.at(3 * n), &normal.at(3 * n) + 3)},
                      {"motion", std::vector<double>(&motion.at(columns * n), &motion.at(columns * n) + columns)}});
+    if (!shape.empty()) walls.back()["shape"] = std::vector<double>(&shape.at(8 * n), &shape.at(8 * n) + 8);
+  }
   return walls;
 }
 

@@ -97,6 +97,24 @@ DECK_ERRORS = {
     "one-way wall that is shaken": (
         walled('name = "valve"\nnormal = [1, 0]\none_way = true\nvelocity = {amplitude = 0.1, frequency = 1}'),
         9, ["is one-way and shaken", "give a constant velocity"]),
+    "wall of an unknown shape": (walled('name = "egg"\nshape = "egg"'), 11, ["'shape' cannot be 'egg'", "sphere"]),
+    "round wall without a radius": (
+        walled('name = "cavity"\nshape = "sphere"\ncentre = [5, 5]'), 9, ["'cavity' is a sphere without radius", "give centre and radius"]),
+    "round wall with a centre in three dimensions": (
+        walled('name = "cavity"\nshape = "sphere"\ncentre = [5, 5, 5]\nradius = 5'), 9, ["a centre of 3 numbers", "give 2"]),
+    "round wall in a periodic box": (
+        walled('name = "cavity"\nshape = "sphere"\ncentre = [5, 5]\nradius = 5').replace('["wall", "wall"]', '["periodic", "wall"]'),
+        9, ["is round, and axis 0 of the box is periodic", "make that boundary wall or open"]),
+    "round wall that moves": (
+        walled('name = "cavity"\nshape = "sphere"\ncentre = [5, 5]\nradius = 5\nvelocity = 0.1'), 9, ["is round and moves"]),
+    "cylinder in two dimensions": (
+        walled('name = "tube"\nshape = "cylinder"\ncentre = [5, 5]\nradius = 5\naxis = [0, 1]'),
+        9, ["is a cylinder in two dimensions", 'shape = "sphere"']),
+    "plane with a radius": (walled('name = "lid"\nnormal = [0, 1]\nradius = 5'), 9, ["is a plane and has keys of a round wall"]),
+    "motion that ends before the start": (
+        walled('name = "y+"\nvelocity = 0.1\nuntil = -1'), 12, ["'until' must be zero or positive (is -1)"]),
+    "spheres outside of a cavity": (
+        walled('name = "cavity"\nshape = "sphere"\ncentre = [5, 5]\nradius = 3'), 5, ["not inside the walls", "'cavity'"]),
     "fixed particles with velocities": (
         changed("mass = 1.0", "mass = 1.0\nfixed = true"), 12, ["'velocity' of fixed particles", "leave it out"]),
     "fixed particles with a temperature": (

@@ -52,14 +52,17 @@ DISCS = toml_text(tomllib.loads(SPHERES) | {
     "output": {"directory": "unused", "frame_interval": 0.7, "thermo_interval": 0.3}})
 
 
-# Every law at once: rough and inelastic discs, some of ice, between a ramp, a shaken floor, a piston and a thermal wall, in a bath.
+# Every law at once: rough and inelastic discs, some of ice, between a ramp, a shaken floor, a piston that stops, a thermal wall, a circle
+# and a post, in a bath.
 LAWS = tomllib.loads(DISCS) | {
     "title": "laws",
     "system": {"dimension": 2, "box": [30.0, 20.0], "boundary": ["wall", "wall"]},
     "contact": [{"between": ["*", "*"], "restitution": 0.95, "tangential": 0.5, "friction": 0.3},
                 {"between": ["large", "large"], "restitution": {"form": "power", "v0": 0.5, "exponent": 0.25}, "tangential": -0.2}],
-    "wall": [{"name": "x+", "velocity": 0.1}, {"name": "x-", "temperature": 2.0},
+    "wall": [{"name": "x+", "velocity": 0.1, "until": 1.1}, {"name": "x-", "temperature": 2.0},
              {"name": "ramp", "normal": [1.0, 2.0], "offset": 8.0},
+             {"name": "post", "shape": "sphere", "centre": [15.0, 10.0], "radius": 2.0, "inside": False},
+             {"name": "tank", "shape": "sphere", "centre": [15.0, 10.0], "radius": 17.5},
              {"name": "y-", "velocity": {"amplitude": 0.2, "frequency": 0.5}}],
     "particles": [{"name": "large", "count": 120, "temperature": 1.0, "rotational_temperature": 0.5, "radius": 0.6, "mass": 2.0},
                   {"name": "small", "count": 80, "temperature": 1.0, "radius": 0.4, "inertia": 0.9}],

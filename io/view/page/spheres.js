@@ -45,11 +45,13 @@ class Spheres {
   setValues(values, range) { Object.assign(this, { values, range }); }
   // `pairs`: two ids for each bond.
   setBonds(pairs) { this.bonds = pairs; }
-  // `boundary`: wall, periodic or open, for each axis. `planes`: further walls and walls that have moved.
-  setBox(edges, boundary, flat, planes = []) {
+  // `boundary`: wall, periodic or open, for each axis. `planes`: further walls and walls that have moved. `round`: the shapes of the
+  // others, drawn as circles and lines.
+  setBox(edges, boundary, flat, planes = [], round = []) {
     const corner = (bits) => edges.map((edge, k) => (bits & (1 << k) ? edge : 0)), ends = [], dimension = flat ? 2 : 3;
     for (let bits = 0; bits < 1 << dimension; bits++)
       for (let k = 0; k < dimension; k++) if (!(bits & (1 << k))) ends.push(...corner(bits), ...corner(bits | (1 << k)));
+    for (const shape of round) ends.push(...outlineOf(shape, edges, flat).flat());
     if (flat) for (let k = 2; k < ends.length; k += 3) ends[k] = 0;
     this.lines("box", ends);
     Object.assign(this, { edges, boundary, flat, walls: [...wallsOf(edges, boundary, flat), ...planes.map((plane) => partOf(plane, edges, flat))] });
@@ -185,8 +187,39 @@ function wallsOf(edges, boundary, flat) {
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 // Where a wall is at a time: normal·x = level.
-function planeOf({ normal, motion: [offset, velocity, amplitude, frequency, phase = 0] }, time) {
+function planeOf({ normal, motion: [offset, velocity, amplitude, frequency, phase = 0, until] }, now) {
+  const time = Math.min(now, until ?? Infinity);
   return { normal, level: offset + velocity * time + amplitude * Math.sin(2 * Math.PI * (frequency * time + phase)) };
+}
+// The ends of the lines that show a sphere (three great circles), a cylinder (circles and lines along it) or, in two dimensions, a circle.
+function outlineOf([radius, ...numbers], edges, flat) {
+  const centre = numbers.slice(0, 3), along = numbers.slice(3, 6), ends = [], corners = 96;
+  const at = (...terms) => [0, 1, 2].map((k) => centre[k] + terms.reduce((sum, [length, vector]) => sum + length * vector[k], 0));
+  const circle = (u, v, ...terms) => {
+    for (let k = 0; k < corners; k++)
+      for (const turn of [k, k + 1].map((corner) => 2 * Math.PI * corner / corners))
+        ends.push(at([radius * Math.cos(turn), u], [radius * Math.sin(turn), v], ...terms));
+  };
+  const axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+  if (flat) circle(axes[0], axes[1]);
+  else if (!along.some((x) => x)) for (let k = 0; k < 3; k++) circle(axes[k], axes[(k + 1) % 3]);
+  else {
+    const [u, v] = across(along), heights = [0, 1, 2, 3, 4, 5, 6, 7].map((bits) => along.reduce((sum, x, k) => sum + x * ((bits & (1 << k) ? edges[k] : 0) - centre[k]), 0));
+    const [low, high] = [Math.min(...heights), Math.max(...heights)];
+    for (let part = 0; part <= 4; part++) circle(u, v, [low + part * (high - low) / 4, along]);
+    for (let k = 0; k < 8; k++) {
+      const turn = Math.PI * k / 4, out = [[radius * Math.cos(turn), u], [radius * Math.sin(turn), v]];
+      ends.push(at(...out, [low, along]), at(...out, [high, along]));
+    }
+  }
+  return ends;
+}
+// Two unit vectors that are normal to a unit vector and to each other.
+function across(normal) {
+  const other = Math.abs(normal[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0];
+  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const u = cross(normal, other), length = Math.hypot(...u), unit = u.map((x) => x / length);
+  return [unit, cross(normal, unit)];
 }
 // The part of a plane that is in the box, as triangles; in two dimensions a band behind it.
 function partOf({ normal, level }, edges, flat) {
@@ -207,9 +240,7 @@ function partOf({ normal, level }, edges, flat) {
     return { normal, level, corners: [p, q, behind(p), behind(p), q, behind(q)] };
   }
   const middle = [0, 1, 2].map((k) => ends.reduce((sum, x) => sum + x[k], 0) / ends.length);
-  const across = Math.abs(normal[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0];
-  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-  const u = cross(normal, across), v = cross(normal, u);
+  const [u, v] = across(normal);
   const angle = (x) => { const d = x.map((each, k) => each - middle[k]); return Math.atan2(dot(d, v), dot(d, u)); };
   ends.sort((a, b) => angle(a) - angle(b));
   return { normal, level, corners: ends.flatMap((x, k) => [middle, x, ends[(k + 1) % ends.length]]) };

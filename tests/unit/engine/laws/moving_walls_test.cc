@@ -62,6 +62,42 @@ TEST(FurtherWalls, APartitionActsOnBothSides) {
   }
 }
 
+/// A piston, or a shaken floor, stops at its time, in the middle of a step, and the ledger closes.
+TEST(MovingWalls, StopAtTheirTime) {
+  for (const std::string& method : kMethods)
+    for (const bool shaken : {false, true}) {
+      auto system = test::make_system<2>({12, 4}, Boundary::wall, {{2, 2}, {4, 1}, {8, 2}, {10, 3}},
+                                         {{0.5, 0.3}, {-0.4, 0.1}, {0.6, -0.2}, {1.5, 0.1}});
+      WallOptions<2> wall{.name = "x+", .until = 3.03};
+      if (shaken) wall.amplitude = 0.5, wall.frequency = 0.1;
+      if (!shaken) wall.velocity = 0.25;
+      system->box.add(wall);
+      const double place = shaken ? 0.5 * std::sin(2 * std::numbers::pi * 0.1 * 3.03) : 0.25 * 3.03;
+      const auto at = [&](double time) {
+        Box<2> box = system->box;
+        box.begin_step(time, 0);
+        return box.wall(1);
+      };
+      EXPECT_NE(at(3).velocity_at(0), 0);
+      EXPECT_EQ(at(3.03).velocity_at(0), 0);
+      EXPECT_NEAR(at(5).level(0), place - 12, 1e-14);
+      auto run = test::make_run<2>(std::move(system), method, {.step = 0.1, .end_time = 16, .events = true});
+      test::ContactCollector log;
+      run->add(log);
+      run->run();
+      int hits = 0;
+      for (const auto& contact : log.all)
+        if (contact.key.kind == EventKind::wall && contact.key.hi == 1 && contact.key.time > 3.1) {
+          ++hits;
+          EXPECT_NEAR(contact.x_hi[0], 12 - place, 1e-12) << method;
+        }
+      EXPECT_GT(hits, 1) << method;
+      const Statistics& s = run->statistics();
+      EXPECT_LT(s.max_energy_error, 1e-13 * s.energy_reference) << method;
+      EXPECT_NE(s.counters.work.value(), 0) << method;
+    }
+}
+
 /// The first contact against steps of 10⁻⁴.
 TEST(ShakenContact, IsTheFirst) {
   int found = 0;

@@ -189,10 +189,10 @@ TEST(Walls, AreRefusedWhereTheyMeanNothing) {
   EXPECT_EQ(message({.name = "z+"}),
             "the wall 'z+' is no face of the box and has no normal; give a normal that is not zero, or the name of a "
             "face: x-, x+, y-, y+");
-  EXPECT_EQ(
-      message({.name = "x+", .normal = {1, 0}}),
-      "the wall 'x+' is a face of the box, which has its normal, its place and one side; leave normal, offset and "
-      "one_sided out, or choose another name");
+  EXPECT_EQ(message({.name = "x+", .normal = {1, 0}}),
+            "the wall 'x+' is a face of the box, which has its normal, its place and one side; leave shape, normal, "
+            "offset and "
+            "one_sided out, or choose another name");
   EXPECT_EQ(message({.name = "ramp", .normal = {1, 1}}), "");
 }
 
