@@ -22,7 +22,7 @@ std::vector<std::string> face_names() {
 
 /// Checks a round wall, and makes its direction a unit vector.
 template <int D>
-void check_round(const Box<D>& box, WallOptions<D>& wall, const auto& refuse) {
+void check_round(WallOptions<D>& wall, const auto& refuse) {
   if (wall.normal != Vec<D>::Zero() || wall.offset != 0)
     refuse("is round and has the normal or the offset of a plane", "leave these out");
   if (wall.moves()) refuse("is round and moves, which only planes do", "leave velocity and moved out");
@@ -30,11 +30,6 @@ void check_round(const Box<D>& box, WallOptions<D>& wall, const auto& refuse) {
     refuse("is round and lets spheres be on both sides",
            "leave one_sided and one_way out, and take two walls, inside = true and inside = false");
   if (const double length = wall.direction.norm(); length > 0) wall.direction /= length;
-  for (int k = 0; k < D; ++k)
-    if (box.periodic(k) && std::abs(wall.direction[k]) != 1)
-      refuse("is round, and axis " + std::to_string(k) + " of the box is periodic",
-             D == 2 ? "make that boundary wall or open"
-                    : "make that boundary wall or open; only a cylinder along the axis can be periodic");
 }
 
 }  // namespace
@@ -70,7 +65,7 @@ void Box<D>::add(WallOptions<D> wall) {
              "leave shape, normal, offset and one_sided out, or choose another name");
   } else {
     if (wall.round > 0)
-      check_round(*this, wall, refuse);
+      check_round(wall, refuse);
     else if (!(length > 0)) {
       std::string known;
       for (int k = 0; k < D; ++k)
@@ -82,6 +77,10 @@ void Box<D>::add(WallOptions<D> wall) {
       wall.normal /= length;
       wall.offset /= length;
     }
+    for (int k = 0; k < D; ++k)
+      if (periodic(k) && (wall.round > 0 ? std::abs(wall.direction[k]) != 1 : wall.normal[k] != 0))
+        refuse("is not the same in all images of the box along axis " + std::to_string(k) + ", which is periodic",
+               "make that boundary wall or open, or give a wall that is parallel to the axis");
     wall.number = 2 * D;
     for (const WallOptions<D>& each : options)
       if (each.number >= 2 * D) wall.number = each.number + (each.one_sided ? 1 : 2);

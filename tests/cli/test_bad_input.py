@@ -91,6 +91,9 @@ DECK_ERRORS = {
     "wall with a normal in three dimensions": (
         walled('name = "ramp"\nnormal = [0, 0, 1]'), 9, ["a normal of 3 numbers", "give 2"]),
     "face with a normal": (walled('name = "y+"\nnormal = [0, 1]'), 9, ["'y+' is a face of the box", "leave normal"]),
+    "wall across a periodic axis": (
+        walled('name = "lid"\nnormal = [1, 0]').replace('["wall", "wall"]', '["periodic", "wall"]'),
+        9, ["the wall 'lid' is not the same in all images", "make that boundary wall or open"]),
     "one-way wall with two sides": (
         walled('name = "valve"\nnormal = [1, 0]\none_way = true\none_sided = false'), 9, ["'valve' is one-way and has two sides"]),
     "one-way face": (walled('name = "y+"\none_way = true'), 9, ["'y+' is a face of the box and cannot be one-way", "give a normal"]),
@@ -104,7 +107,7 @@ DECK_ERRORS = {
         walled('name = "cavity"\nshape = "sphere"\ncentre = [5, 5, 5]\nradius = 5'), 9, ["a centre of 3 numbers", "give 2"]),
     "round wall in a periodic box": (
         walled('name = "cavity"\nshape = "sphere"\ncentre = [5, 5]\nradius = 5').replace('["wall", "wall"]', '["periodic", "wall"]'),
-        9, ["is round, and axis 0 of the box is periodic", "make that boundary wall or open"]),
+        9, ["along axis 0, which is periodic", "make that boundary wall or open"]),
     "round wall that moves": (
         walled('name = "cavity"\nshape = "sphere"\ncentre = [5, 5]\nradius = 5\nvelocity = 0.1'), 9, ["is round and moves"]),
     "cylinder in two dimensions": (

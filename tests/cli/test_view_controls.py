@@ -2,11 +2,13 @@
 """The page of `carom view` in a real browser: bonds, walls, keys to the colours, clicks, keys, the clip plane, pictures, films."""
 
 import time
+import tomllib
 
 import numpy as np
 
 from browsing import BACKGROUND, PLACE, click, colour_by, differing, exported, label, lit, picture, pixel, press, wait_for
-from runs import SPHERES, needs_carom
+from carom_files import toml_text
+from runs import SPHERES, SPRINGS, needs_carom
 from test_view import page
 from view_picture import resize
 
@@ -33,6 +35,28 @@ def test_bonds_and_walls_are_drawn(browser, tmp_path):
         assert pixel(browser, pixels, 0.3, 2.5).min() > 100 and pixel(browser, pixels, 8.6, 2.5).min() > 100
         assert abs(pixel(browser, pixels, 4, 2.5) - BACKGROUND).max() < 3
         assert all(abs(pixel(browser, pixels, x, 5.09) - BACKGROUND).max() < 3 for x in np.linspace(1, 8, 20))
+
+
+def brightest(browser, pixels, x, y):
+    """The brightest pixel next to a point of a line."""
+    column, row = browser.execute_script(PLACE, [x, y, 0.0])
+    return pixels[row - 2:row + 3, column - 2:column + 3].max()
+
+
+def test_round_walls_are_drawn(browser, tmp_path):
+    with exported(browser, tmp_path, toml_text(tomllib.loads(SPRINGS) | {
+            "wall": [{"name": "post", "shape": "sphere", "centre": [7.0, 3.9], "radius": 0.7, "inside": False}]}), "run.steps=2"):
+        pixels = picture(browser)
+        around = [(7 + 0.7 * np.cos(turn), 3.9 + 0.7 * np.sin(turn)) for turn in np.linspace(0, 6, 25)]
+        assert min(brightest(browser, pixels, *place) for place in around) > 60, "a circle"
+        assert abs(pixel(browser, pixels, 7.0, 3.9) - BACKGROUND).max() < 3
+        # In three dimensions a sphere has three circles, and a cylinder along z five and eight lines.
+        ends = browser.execute_script("""return [[0, 0, 0], [0, 0, 1]].map((along) => {
+            const { spheres } = panels[0];
+            spheres.setBox([4, 4, 4], ["wall", "wall", "wall"], false, [], [[2, 2, 2, 2, ...along, 1]]);
+            return spheres.corners.box;
+        })""")
+        assert ends == [24 + 3 * 96 * 2, 24 + 5 * 96 * 2 + 8 * 2]
 
 
 def test_the_key_to_the_colours(browser, tmp_path):

@@ -225,7 +225,7 @@ TEST(RoundWalls, AreRefusedWhereTheyMakeNoSense) {
                        {"axis", std::vector{0.0, 0.0, 1.0}},
                        {"radius", 3.0}});
        }),
-       "axis 1 of the box is periodic");
+       "along axis 1, which is periodic");
 }
 
 }  // namespace
