@@ -224,15 +224,16 @@ template <int D>
 EventResult<D> Flights<D>::meet_step(const StepSurface& step, Slot i, Record<D>& a, Slot j, Record<D>& b,
                                      const Vec<D>& d, std::uint32_t generation) const {
   const Vec<D> v = a.v - b.v;
-  const double sigma = contact_distance(i, j), inverse_mass = 1 / mass(i) + 1 / mass(j);
-  const PairImpulse<D> met = step_impulse<D>(step, d, v, inverse_mass);
+  const double sigma = contact_distance(i, j);
+  const PairImpulse<D> met = step_impulse<D>(step, laws(), d, v, {mass(i), radius(i), a.species, nullptr},
+                                             {mass(j), radius(j), b.species, nullptr});
   met.apply(d, mass(i), a.v, mass(j), b.v);
   a.generation = b.generation = static_cast<std::uint16_t>(generation);
   const double range = step.distance(sigma);
   const Vec<D> impulse = met.on_first(d);
   return {d,
           impulse,
-          {.virial = d.dot(impulse), .stored = met.stored, .event = met.event},
+          {.virial = d.dot(impulse), .dissipated = met.dissipated, .stored = met.stored, .event = met.event},
           step.tether() ? d.norm() / range - 1 : 0,
           range};
 }

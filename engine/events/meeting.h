@@ -163,9 +163,11 @@ WallImpulse<D> wall_impulse(const ContactLaws& laws, const Wall<D>& wall, const 
 }
 
 /// Resolves a contact of two of these particles, or of one and a wall, now: changes their velocities and internal
-/// states, and returns the energy lost. `d`: x_lo − x_hi of the image that is touched.
+/// states, and returns the energy lost. `d`: x_lo − x_hi of the image that is touched; where the pair pulls at its
+/// `tether`, there is no friction.
 template <int D>
-double resolve_contact(const EventKey<D>& key, const Vec<D>& d, const Box<D>& box, Particles<D>& p) {
+double resolve_contact(const EventKey<D>& key, const Vec<D>& d, const Box<D>& box, Particles<D>& p,
+                       bool tether = false) {
   const Id lo = key.lo, hi = key.hi;
   const bool has_internal = box.contacts.need_internal();
   Internal<D> internal[2];
@@ -184,7 +186,9 @@ double resolve_contact(const EventKey<D>& key, const Vec<D>& d, const Box<D>& bo
     store(lo, 0);
     return exchange.dissipated;
   }
-  const auto impulse = pair_impulse<D>(box.contacts, d, p.v[lo] - p.v[hi], partner(lo, 0), partner(hi, 1));
+  const Vec<D> v = p.v[lo] - p.v[hi];
+  const auto impulse = tether ? normal_impulse<D>(box.contacts, d, v, partner(lo, 0), partner(hi, 1))
+                              : pair_impulse<D>(box.contacts, d, v, partner(lo, 0), partner(hi, 1));
   impulse.apply(d, p.mass[lo], p.v[lo], p.mass[hi], p.v[hi]);
   store(lo, 0);
   store(hi, 1);

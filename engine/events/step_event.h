@@ -110,15 +110,48 @@ inline const StepSurface* step_at(const PairSteps& steps, double distance, doubl
   return nearest;
 }
 
+/// What stops a pair whatever its energy: its core, which it meets from outside, or its tether, from inside.
+struct HardSurface {
+  double distance = 0;  ///< [length]
+  double side = 1;      ///< −1: a tether
+  bool tether() const { return side < 0; }
+  /// The gap of a pair at this distance [length].
+  double gap(double at) const { return side * (at - distance); }
+};
+
+/// The hard surface that is nearer to a pair at this distance. `sigma`: the sum of the radii.
+inline HardSurface hard_surface(const Steps& steps, Id i, Id j, double sigma, double at) {
+  const PairSteps* const bond = steps.find_bond(i, j);
+  if (!bond) return {sigma};
+  const double core = bond->core_distance(sigma);
+  if (!bond->surfaces.empty() && bond->surfaces.back().tether())
+    if (const double range = bond->surfaces.back().distance(sigma);
+        range - at < at - core && at - range <= kJustMet * at)
+      return {range, -1};
+  return {core};
+}
+
+/// A tether pulls a pair back by the law of its contacts, without friction.
+template <int D>
+PairImpulse<D> tether_impulse(const ContactLaws& laws, const Vec<D>& d, const Vec<D>& v, const Partner<D>& a,
+                              const Partner<D>& b) {
+  PairImpulse<D> impulse = normal_impulse<D>(laws, -d, v, a, b);
+  impulse.factor = -impulse.factor;
+  impulse.event = PairEvent::bounce;
+  return impulse;
+}
+
 /// A pair reaches a step. It crosses if b² > 2 c d² (1/m_i + 1/m_j), where c is the energy that it must climb, and
 /// then b² decreases by this number; otherwise b changes its sign (Alder, Wainwright, J. Chem. Phys. 31 (1959) 459).
 /// The factor has no cancellation for small c, and d is not normalised, so that the kinetic energy changes by −c to
 /// rounding.
 template <int D>
-PairImpulse<D> step_impulse(const StepSurface& step, const Vec<D>& d, const Vec<D>& v, double inverse_mass) {
-  const double b = d.dot(v), weight = d.squaredNorm() * inverse_mass;
+PairImpulse<D> step_impulse(const StepSurface& step, const ContactLaws& laws, const Vec<D>& d, const Vec<D>& v,
+                            const Partner<D>& of_a, const Partner<D>& of_b) {
+  if (step.tether()) return tether_impulse<D>(laws, d, v, of_a, of_b);
+  const double b = d.dot(v), weight = d.squaredNorm() * (1 / of_a.mass + 1 / of_b.mass);
   const double climb = b > 0 ? step.climb : -step.climb, left = b * b - 2 * climb * weight;
-  if (step.tether() || !(left > 0)) return {.factor = -2 * b / weight, .event = PairEvent::bounce};
+  if (!(left > 0)) return {.factor = -2 * b / weight, .event = PairEvent::bounce};
   return {.factor = -2 * climb / (b + std::copysign(std::sqrt(left), b)),
           .stored = climb,
           .event = b > 0 ? PairEvent::leave : PairEvent::enter};

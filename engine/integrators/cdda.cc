@@ -59,7 +59,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     if (watch_) watch_->before_change();  // a solve changes the accelerations that the next one starts from
     auto& p = system.particles;
     const auto contact = [&](const Touch<D>& touch) {
-      return resolve_contact<D>(touch.key, touch.normal, system.box, p);
+      return resolve_contact<D>(touch.key, touch.normal, system.box, p, touch.tether);
     };
     double done = 0, longest = slab.length;
     bool ended = false;
@@ -94,12 +94,30 @@ class CollisionDiscreteDerivative : public Integrator<D> {
       owed_ += scan_->slide(p.x, p.v);
       fold(system);
       done += tau;
+      for (const Arrival<D>& arrival : contacts_->arrivals()) meet_step(system, arrival, done);
     }
     system.wrap();
     report.reached = slab.length;
   }
 
  private:
+  /// Executes the event of a pair that has arrived at a step, `time` after the start of the slab, unless an earlier one
+  /// has turned the pair back.
+  void meet_step(System<D>& system, const Arrival<D>& arrival, double time) {
+    auto& p = system.particles;
+    const Id lo = arrival.key.lo, hi = arrival.key.hi;
+    const Vec<D> d = p.x[lo] - p.x[hi] + system.box.shift(arrival.key.image), v = p.v[lo] - p.v[hi];
+    if (arrival.side * d.dot(v) > 0) return;
+    const auto partner = [&](Id i) { return Partner<D>{p.mass[i], p.radius[i], p.species[i]}; };
+    const PairImpulse<D> impulse = step_impulse<D>(*arrival.step, system.box.contacts, d, v, partner(lo), partner(hi));
+    impulse.apply(d, p.mass[lo], p.v[lo], p.mass[hi], p.v[hi]);
+    Contact<D> contact{arrival.key, p.x[lo], p.x[hi] - system.box.shift(arrival.key.image), impulse.on_first(d)};
+    contact.exchange = {.virial = d.dot(contact.impulse), .stored = impulse.stored, .event = impulse.event};
+    contact.v_lo = p.v[lo];
+    contact.v_hi = p.v[hi];
+    scan_->commit(time, {&contact, 1});
+  }
+
   /// Estimates the local error of the piece in piece_. Throws StepTooLong.
   void judge(const System<D>& system, const Slab& slab, double tau, SlabReport<D>& report) {
     const double noise =
@@ -229,6 +247,7 @@ IntegratorInfo cdda() {
           "Enomoto, thesis, 2011; Gonzalez, J. Nonlinear Sci. 6 (1996) 449; LaBudde, Greenspan, Numer. Math. "
           "25 (1976) 323; Suzuki, Phys. Lett. A 146 (1990) 319",
       .exact = true,
+      .steps = true,
       .adapts = true,
       .in_2d = make<CollisionDiscreteDerivative, 2>,
       .in_3d = make<CollisionDiscreteDerivative, 3>};

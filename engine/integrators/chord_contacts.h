@@ -6,10 +6,16 @@
 // chords or, beyond τ, on their extension: the piece that ends in contact is a fixed point of c. A pair that touches at
 // the start has the trivial contact τ = 0. The function gap(τ)/τ ≈ (2 d·v̄ + τ v̄²)/2σ does not have this zero: it starts
 // at the velocity of separation and falls through zero where the pair meets again.
+//
+// A pair inside a step or a tether meets it from inside: there the gap and its rates have the other sign. On which side
+// of a step a pair is at the start says step_event.h. A pair that is on another side at the end of a piece, within the
+// tolerance, has arrived at the step, and its event is due at once, since nothing else is stored about its side.
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
+#include "engine/events/step_event.h"
 #include "engine/integrators/discrete_gradient.h"
 #include "engine/stepping/contact_scan.h"
 
@@ -25,28 +31,48 @@ struct PieceEnd {
   EventKey<D> violator{};   ///< the contact that overlaps
 };
 
+/// A pair that has reached a step at the end of a piece. Its side is 1 if it comes from outside, −1 from inside.
+template <int D>
+struct Arrival {
+  EventKey<D> key;
+  const StepSurface* step = nullptr;
+  double side = 1;
+};
+
 template <int D>
 class ChordContacts {
  public:
   ChordContacts(const System<D>& system, ContactScan<D>& scan) : system_(system), scan_(scan) {}
 
+  /// The pairs that have reached a step at the end of the last piece that was judged, in the order of their keys.
+  std::span<const Arrival<D>> arrivals() const { return arrivals_; }
+
   /// Judges the last solve of `piece`, which went from (x, v) over tau.
-  PieceEnd<D> judge(Positions<D> x, Positions<D> v, const DiscreteGradient<D>& piece, double tau) const {
+  PieceEnd<D> judge(Positions<D> x, Positions<D> v, const DiscreteGradient<D>& piece, double tau) {
     PieceEnd<D> end;
     EventKey<D> key;
     const auto &chord = piece.chord(), &v_end = piece.v();
+    const bool has_steps = !system_.box.steps.empty();
+    arrivals_.clear();
     for (const auto& pair : scan_.list().cover(x, piece.x())) {
       const Id i = pair.i, j = pair.j;
       key.lo = i;
       key.hi = j;
       key.image = pair.image;
       const Vec<D> d = x[i] - x[j] + system_.box.shift(pair.image), u = chord[i] - chord[j];
-      const double sigma = scan_.contact_distance(i, j);
+      if (has_steps) [[unlikely]]
+        if (const PairSteps* const steps = scan_.steps(i, j)) {
+          judge_steps(key, *steps, d, u, v, piece, tau, end);
+          continue;
+        }
+      const double sigma = system_.particles.radius[i] + system_.particles.radius[j];
       const double reach = sigma + tau * u.norm() + scan_.tolerance(sigma);
       if (d.squaredNorm() > reach * reach * kProlongation || scan_.rests(key)) continue;
       const double slack = sigma * (scan_.rounding_speed(i, v[i]) + scan_.rounding_speed(j, v[j]));
-      judge_pair(key, d, u, v[i] - v[j], v_end[i] - v_end[j], sigma, tau, slack, end);
+      judge_pair<1>(key, d, d + tau * u, u, v[i] - v[j], v_end[i] - v_end[j], sigma, scan_.tolerance(sigma), tau, slack,
+                    end);
     }
+    std::ranges::sort(arrivals_, {}, &Arrival<D>::key);
     key.kind = EventKind::wall;
     key.image = {};
     for (Id i = 0; i < x.size(); ++i)
@@ -72,13 +98,50 @@ class ChordContacts {
     end.violator = key;
   }
 
-  void judge_pair(const EventKey<D>& key, const Vec<D>& d, const Vec<D>& u, const Vec<D>& v, const Vec<D>& v_end,
-                  double sigma, double tau, double slack, PieceEnd<D>& end) const {
-    const double tolerance = scan_.tolerance(sigma);
-    const Vec<D> d_end = d + tau * u;
-    const double gap_end = d_end.norm() - sigma;
-    if (d.norm() - sigma > tolerance) {
-      const double c = contact_time<D>(d, u, sigma, 0.0);
+  /// A pair with steps, at the surfaces that it can reach next.
+  void judge_steps(const EventKey<D>& key, const PairSteps& steps, const Vec<D>& d, const Vec<D>& u, Positions<D> v,
+                   const DiscreteGradient<D>& piece, double tau, PieceEnd<D>& end) {
+    const auto& radius = system_.particles.radius;
+    const auto &x_end = piece.x(), &v_end = piece.v();
+    const Id i = key.lo, j = key.hi;
+    const double sigma = radius[i] + radius[j], rounding = scan_.tolerance(0);
+    const double far = steps.farthest(sigma) + scan_.tolerance(sigma) + 2 * tau * u.norm();
+    if (d.squaredNorm() > far * far) return;
+    const Vec<D> d_end = x_end[i] - x_end[j] + system_.box.shift(key.image);  // as the next piece computes it
+    const Vec<D> v_start = v[i] - v[j], v_last = v_end[i] - v_end[j];
+    const std::size_t passed =
+        steps_passed<D>(steps, {d, v_start}, sigma, rounding, approach_slack(sigma, v[i].norm(), v[j].norm()));
+    const auto hard = [&]<int kSide>(double distance) {
+      if (scan_.rests(key)) return;
+      const double slack = sigma * (scan_.rounding_speed(i, v[i]) + scan_.rounding_speed(j, v[j]));
+      judge_pair<kSide>(key, d, d_end, u, v_start, v_last, distance, scan_.tolerance(sigma), tau, slack, end);
+    };
+    const auto step = [&]<int kSide>(const StepSurface& surface) {
+      const double distance = surface.distance(sigma), gap = kSide * (d_end.norm() - distance);
+      // On a tangent a pair is outside.
+      const double slack = kSide * approach_slack(sigma, v_end[i].norm(), v_end[j].norm());
+      judge_pair<kSide>(key, d, d_end, u, v_start, v_last, distance, rounding, tau, slack, end);
+      if (std::abs(gap) <= rounding && kSide * d_end.dot(v_last) < -slack) arrivals_.push_back({key, &surface, kSide});
+    };
+    if (passed == 0)
+      hard.template operator()<1>(steps.core_distance(sigma));
+    else
+      step.template operator()<1>(steps.surfaces[passed - 1]);
+    if (passed == steps.surfaces.size()) return;
+    if (const StepSurface& next = steps.surfaces[passed]; next.tether())
+      hard.template operator()<-1>(next.distance(sigma));
+    else
+      step.template operator()<-1>(next);
+  }
+
+  /// A pair and the distance `sigma`, which it meets from outside (kSide = 1) or from inside (−1).
+  template <int kSide>
+  void judge_pair(const EventKey<D>& key, const Vec<D>& d, const Vec<D>& d_end, const Vec<D>& u, const Vec<D>& v,
+                  const Vec<D>& v_end, double sigma, double tolerance, double tau, double slack,
+                  PieceEnd<D>& end) const {
+    const double gap = kSide * (d.norm() - sigma), gap_end = kSide * (d_end.norm() - sigma);
+    if (gap > tolerance) {
+      const double c = kSide > 0 ? contact_time<D>(d, u, sigma, 0.0) : leaving_time<D>(PairMotion<D>{d, u}, sigma, 0.0);
       if (std::abs(gap_end) <= kClosed * tolerance)
         end.touches = true;
       else if (c < tau)
@@ -86,11 +149,11 @@ class ChordContacts {
       end.contact = std::min(end.contact, c);
       return;
     }
-    const double departing = 2 * d.dot(v), quotient = 2 * d.dot(u) + tau * u.squaredNorm();
-    const bool through = d.dot(u) < 0 && d.dot(d_end) < 0.5 * sigma * sigma;
-    if (gap_end < scan_.floor(d.norm() - sigma, tolerance) || through)
+    const double departing = kSide * 2 * d.dot(v), quotient = kSide * (2 * d.dot(u) + tau * u.squaredNorm());
+    const bool through = kSide > 0 && d.dot(u) < 0 && d.dot(d_end) < 0.5 * sigma * sigma;
+    if (gap_end < scan_.floor(gap, tolerance) || through)
       violate(key, end);
-    else if (gap_end <= tolerance && d_end.dot(v_end) < -slack)
+    else if (gap_end <= tolerance && kSide * d_end.dot(v_end) < -slack)
       end.touches = true;
     if (quotient < departing)
       end.contact = std::min(end.contact, std::max(0.0, departing) * tau / (departing - quotient));
@@ -116,6 +179,7 @@ class ChordContacts {
 
   const System<D>& system_;
   ContactScan<D>& scan_;
+  std::vector<Arrival<D>> arrivals_;
 };
 
 }  // namespace carom::integrator

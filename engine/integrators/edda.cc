@@ -142,7 +142,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
         if (found_.touching) {
           system.decomposition.need_all();
           owed_ += scan.resolve(done, p.x, p.v, [&](const Touch<D>& touch) {
-            return resolve_contact<D>(touch.key, touch.normal, system.box, p);
+            return resolve_contact<D>(touch.key, touch.normal, system.box, p, touch.tether);
           });
           found_.touching = !scan.resting().empty();
         }

@@ -104,8 +104,9 @@ class PrimitiveSplitting : public Integrator<D> {
     auto& scan = core_->scan();
     if (!system.decomposition.any(scan.find_contacts(time, p.x, p.v))) return false;
     system.decomposition.need_all();
-    scan.resolve(time, p.x, p.v,
-                 [&](const Touch<D>& touch) { return resolve_contact<D>(touch.key, touch.normal, system.box, p); });
+    scan.resolve(time, p.x, p.v, [&](const Touch<D>& touch) {
+      return resolve_contact<D>(touch.key, touch.normal, system.box, p, touch.tether);
+    });
     return true;
   }
 

@@ -88,7 +88,7 @@ template <int D>
 void check_laws(const System<D>& system, const IntegratorInfo& info) {
   if (const std::string no = info.refusal_of_steps(); !no.empty() && !system.box.steps.empty())
     throw Error(Failure::deck, no);
-  if (info.stepping && !system.box.steps.empty() && !system.box.contacts.elastic())
+  if (info.stepping && std::isfinite(system.box.steps.least_climb()) && !system.box.contacts.elastic())
     throw Error(Failure::deck, std::string(steps_and_laws));
   if (const Bath& bath = system.box.bath;
       bath.damps() && bath.friction.size() != 1 && bath.friction.size() != system.species.size())

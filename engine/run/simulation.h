@@ -58,10 +58,10 @@ struct EndlessRun {
   std::string what, remedy;
 };
 
-/// Why methods with steps refuse [[step]] next to a law of contacts.
+/// Why methods with steps refuse steps of finite height next to a law of contacts.
 inline constexpr std::string_view steps_and_laws =
-    "contacts with a law come to rest in methods with steps, which then lose track of the steps of pairs; leave "
-    "[[contact]] or [[step]] out, or take free-flight";
+    "where contacts lose energy, pairs come to rest at the ranges of wells and shoulders, and methods with steps of "
+    "time cannot hold them there; leave [[contact]] or the ranges out, or take free-flight; tethers and cores may stay";
 
 /// Checks the ends of a plan. `info`: the method, null if it is unknown; `ramp`: the bath has a ramp without times.
 EndlessRun endless(const Plan& plan, const IntegratorInfo* info, bool ramp);

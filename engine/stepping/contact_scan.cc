@@ -65,13 +65,22 @@ void ContactScan<D>::find_touching(double time, Positions<D> x) {
   };
   EventKey<D> key;
   key.time = time;
+  const auto name = [&](const NeighbourPair<D>& pair) { key.lo = pair.i, key.hi = pair.j, key.image = pair.image; };
+  const bool has_steps = !box_.steps.empty();
   for (const auto& pair : list_.cover(x, 0.5 * widest_)) {
     const Vec<D> d = x[pair.i] - x[pair.j] + box_.shift(pair.image);
     const double sigma = contact_distance(pair.i, pair.j), most = sigma + std::max(tolerance(sigma), widest_);
+    if (has_steps) [[unlikely]]
+      if (const HardSurface hard = hard_surface(box_, particles_, pair.i, pair.j, d.norm()); hard.tether()) {
+        name(pair);
+        const double gap = hard.gap(d.norm());
+        if (gap > noticed_gap(key, -d)) continue;
+        note(key, -d, gap, sigma);
+        touching_.back().tether = true;
+        continue;
+      }
     if (d.squaredNorm() > most * most) continue;
-    key.lo = pair.i;
-    key.hi = pair.j;
-    key.image = pair.image;
+    name(pair);
     if (widest_ > 0 && d.norm() - sigma > noticed_gap(key, d)) continue;
     note(key, d, d.norm() - sigma, sigma);
   }
@@ -218,7 +227,8 @@ void ContactScan<D>::record(const Touch<D>& touch, Positions<D> x, Positions<D> 
   contact.v_lo = v[lo];
   if (touch.pair()) {
     contact.v_hi = v[hi];
-    contact.exchange.virial = touch.normal.dot(impulse);
+    contact.exchange.virial = touch.tether ? -touch.normal.dot(impulse) : touch.normal.dot(impulse);
+    if (touch.tether) contact.exchange.event = PairEvent::bounce;
     contact.x_hi = x[hi] - box_.shift(touch.key.image);
   } else {
     const Wall<D> wall = box_.wall(hi);
@@ -325,8 +335,9 @@ bool ContactScan<D>::hold_means(Positions<D> x, Positions<D> w_before, Vectors<D
     const bool pair = contact.key.kind == EventKind::pair;
     contact.normal = normal(contact.key, x);
     const double sigma = pair ? contact_distance(lo, hi) : particles_.radius[lo];
-    const double gap = pair ? contact.normal.norm() - sigma : box_.wall(hi).gap(x[lo], sigma);
-    if (pair) contact.normal = 2 * contact.normal + length * (w_before[lo] - w_before[hi]);
+    const HardSurface hard = pair ? rest_.surface(contact.key, contact.normal) : HardSurface{};
+    const double gap = pair ? hard.gap(contact.normal.norm()) : box_.wall(hi).gap(x[lo], sigma);
+    if (pair) contact.normal = 2 * contact.normal + hard.side * length * (w_before[lo] - w_before[hi]);
     if (!pair)
       if (const Wall<D> wall = box_.wall(hi); wall.round > 0)
         contact.normal += 0.5 * length * wall.curvature(x[lo]) * wall.across(w_before[lo]);
@@ -346,18 +357,48 @@ bool ContactScan<D>::hold_means(Positions<D> x, Positions<D> w_before, Vectors<D
   return press_apart(w, 2 / std::abs(length));
 }
 
+/// Where methods kick, spheres fly straight, and a pair that turns on its tether would be beyond it after the step: the
+/// rate at which it must come closer, times the length of its normal.
+template <int D>
+double ContactScan<D>::least_pull(const RestingContact<D>& contact, Positions<D> v) const {
+  if (contact.key.kind != EventKind::pair) return 0;
+  const HardSurface hard = rest_.surface(contact.key, contact.normal);
+  if (!hard.tether()) return 0;
+  const Vec<D> u = v[contact.key.lo] - v[contact.key.hi];
+  const double at = contact.normal.norm(), along = contact.normal.dot(u) / at, time = rest_.kick();
+  const double across = time * time * std::max(0.0, u.squaredNorm() - along * along);
+  const double end = std::sqrt(std::max(0.0, hard.distance * hard.distance - across));
+  return at * std::max(0.0, at - end) / time;
+}
+
 template <int D>
 double ContactScan<D>::stop_approach(Positions<D> x, Vectors<D> v, double kick) {
   for (auto& contact : resting_) {
     contact.normal = normal(contact.key, x);
     contact.lambda = contact.force * kick / contact.normal.norm();
-    contact.bound = wall_speed(contact.key);
     contact.slack = normal_slack(contact, v);
   }
+  // The pulls of other tethers turn a pair faster: the problem is solved again until each bound suits the velocities.
+  const bool pulls = rest_.kicks() && !box_.steps.empty();
+  const std::vector<Vec<D>> before(pulls ? v.begin() : v.end(), v.end());
   double lost = 0;
-  solve_reactions<D>(resting_, particles_.mass, v, &lost);
+  for (int round = 0; round < (pulls ? kRoundsOfBraking : 1); ++round) {
+    bool suits = round > 0;
+    for (auto& contact : resting_) {
+      const double pull = pulls ? least_pull(contact, v) : 0;
+      if (round > 0 && pull > 0)
+        suits = suits && contact.normal.dot(v[contact.key.lo] - v[contact.key.hi]) >= pull * (1 - kRounding);
+      contact.bound = contact.key.kind == EventKind::wall ? wall_speed(contact.key)
+                      : round == 0                        ? pull
+                                                          : std::max(pull, contact.bound);
+    }
+    if (suits) break;
+    std::ranges::copy(before, v.begin());
+    lost = 0;
+    solve_reactions<D>(resting_, particles_.mass, v, &lost);
+  }
   for (auto& contact : resting_) {
-    lost += count_push(contact, contact.lambda * contact.normal.norm(), contact.bound);
+    lost += count_push(contact, contact.lambda * contact.normal.norm(), wall_speed(contact.key));
     if (kick > 0) contact.force = contact.lambda * contact.normal.norm() / kick;
   }
   return lost;
@@ -379,9 +420,10 @@ template <int D>
 void ContactScan<D>::drop_open(Positions<D> x) {
   std::erase_if(resting_, [&](const auto& contact) {
     const auto& [key, x_lo] = std::pair(contact.key, x[contact.key.lo]);
-    const double gap = key.kind == EventKind::pair ? normal(key, x).norm() - rest_.distance(key)
+    const Vec<D> along = normal(key, x);
+    const double gap = key.kind == EventKind::pair ? rest_.surface(key, along).gap(along.norm())
                                                    : box_.wall(key.hi).gap(x_lo, rest_.distance(key));
-    return gap > noticed_gap(key, normal(key, x));
+    return gap > noticed_gap(key, along);
   });
 }
 
@@ -394,7 +436,7 @@ double ContactScan<D>::count_dissipated(Positions<D> before, Positions<D> after)
     if (contact.lambda == 0 || !rest_.dissipates(contact.key)) continue;
     Vec<D> both = before[contact.key.lo] + after[contact.key.lo];
     if (contact.key.kind == EventKind::pair) both -= before[contact.key.hi] + after[contact.key.hi];
-    all += contact.lambda * (contact.bound - 0.5 * contact.normal.dot(both));
+    all += contact.lambda * (wall_speed(contact.key) - 0.5 * contact.normal.dot(both));
   }
   if (all != 0) counters_->dissipated.add(all);
   return all;

@@ -23,11 +23,13 @@ namespace carom {
 template <int D>
 struct Touch {
   EventKey<D> key;  ///< key.time counts from now for a future contact
-  Vec<D> normal;  ///< pair: x_lo − x_hi, acting on lo, and its negative on hi; wall: unit vector inwards, acting on lo
+  Vec<D> normal;  ///< pair: x_lo − x_hi, acting on lo, and its negative on hi; wall: unit vector inwards, acting on lo;
+                  ///< at a tether: x_hi − x_lo
   double speed = 0;     ///< velocity of a wall along its normal
   double force = 0;     ///< the reaction of a present contact in the last piece [force]
   double gap = 0;       ///< of a present contact [length]
   bool may_hit = true;  ///< an open contact: whether it gets an impulse at once, because a partner has a contact now
+  bool tether = false;  ///< the pair pulls at its tether
   bool pair() const { return key.kind == EventKind::pair; }
 };
 
@@ -173,8 +175,9 @@ class ContactScan {
   }
   double count_push(const RestingContact<D>& contact, double impulse, double speed);
   double stop_rounding(Vectors<D> v) const;
-  Vec<D> normal(const EventKey<D>& key, Positions<D> x) const { return contact_normal<D>(box_, key, x); }
+  Vec<D> normal(const EventKey<D>& key, Positions<D> x) const { return contact_normal<D>(box_, particles_, key, x); }
   double least_opening(const RestingContact<D>& contact, Positions<D> v, Positions<D> a, double time_left) const;
+  double least_pull(const RestingContact<D>& contact, Positions<D> v) const;
   double normal_slack(const RestingContact<D>& contact, Positions<D> v) const;
   bool press_apart(Vectors<D> w, double force);
   double normal_speed(const Touch<D>& touch, Positions<D> v) const;

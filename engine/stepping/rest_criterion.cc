@@ -23,7 +23,7 @@ void RestCriterion<D>::note_reactions() {
     pressed_[key.lo] += force / particles_.mass[key.lo];
     if (key.kind == EventKind::pair) pressed_[key.hi] += force / particles_.mass[key.hi];
     if (held_.empty()) continue;
-    const Vec<D> along = contact_normal<D>(box_, key, particles_.x).normalized();
+    const Vec<D> along = contact_normal<D>(box_, particles_, key, particles_.x).normalized();
     held_[key.lo] += force / particles_.mass[key.lo] * along;
     if (key.kind == EventKind::pair) held_[key.hi] -= force / particles_.mass[key.hi] * along;
   }
@@ -92,7 +92,9 @@ RestLimits RestCriterion<D>::limits(const EventKey<D>& key, const Vec<D>& normal
     return {kNothing, kNothing, kNothing};
   }
   const double rounding = rounding_speed(key.lo, v_lo) + (pair ? rounding_speed(key.hi, v_hi) : 0.0);
-  const double closing = pressing(key, normal, force);
+  double closing = pressing(key, normal, force);
+  if (pair && !box_.steps.empty() && surface(key, normal).tether())  // a pair that turns pulls at its tether
+    closing = std::max(closing, (v_lo - v_hi).squaredNorm() / normal.norm() - opening_by_forces(key, normal));
   const double resting = closing > 0 ? std::max(rounding, speed_of_rest(closing, distance(key))) : rounding;
   if (!dissipates(key)) return {resting, resting, resting};
   return {resting, std::max(resting, slowest_impact(key, normal, closing)),

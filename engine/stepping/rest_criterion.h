@@ -29,6 +29,7 @@
 
 #include "engine/base/particles.h"
 #include "engine/events/contact.h"
+#include "engine/events/step_event.h"
 #include "engine/laws/box.h"
 #include "engine/laws/interaction.h"
 #include "engine/stepping/resting.h"
@@ -70,11 +71,22 @@ EventKey<D> without_time(EventKey<D> key) {
   return key;
 }
 
-/// The gradient of the gap of a contact at x, up to a positive factor.
+/// The core or the tether with which two particles at this distance have a contact.
 template <int D>
-Vec<D> contact_normal(const Box<D>& box, const EventKey<D>& key, Positions<D> x) {
+HardSurface hard_surface(const Box<D>& box, const Particles<D>& p, Id i, Id j, double distance) {
+  const double sigma = p.radius[i] + p.radius[j];
+  if (box.steps.empty()) return {sigma};
+  return hard_surface(box.steps, p.id_of(i), p.id_of(j), sigma, distance);
+}
+
+/// The gradient of the gap of a contact at x, up to a positive factor: of a pair x_lo − x_hi, or at a tether its
+/// negative.
+template <int D>
+Vec<D> contact_normal(const Box<D>& box, const Particles<D>& p, const EventKey<D>& key, Positions<D> x) {
   if (key.kind == EventKind::wall) return box.wall(key.hi).at(x[key.lo]).normal;
-  return x[key.lo] - x[key.hi] + box.shift(key.image);
+  const Vec<D> d = x[key.lo] - x[key.hi] + box.shift(key.image);
+  if (box.steps.empty()) return d;
+  return hard_surface(box, p, key.lo, key.hi, d.norm()).side * d;
 }
 
 template <int D>
@@ -91,10 +103,16 @@ class RestCriterion {
   /// For methods that kick: within this time the kick that presses partners together counts as slow [time].
   void stop_within(double time) { kick_ = time; }
   bool kicks() const { return kick_ > 0; }
+  double kick() const { return kick_; }  ///< that time, or 0
   /// For methods that cut the step at each contact: contacts that open more than by rounding are not held.
   void let_open() { lets_open_ = true; }
 
-  /// The contact distance, or the radius at a wall.
+  /// The core or the tether at which a pair with this normal, as long as the pair is apart, has a contact.
+  HardSurface surface(const EventKey<D>& key, const Vec<D>& normal) const {
+    if (box_.steps.empty()) return {distance(key)};
+    return hard_surface(box_, particles_, key.lo, key.hi, normal.norm());
+  }
+  /// The contact distance of the cores, or the radius at a wall.
   double distance(const EventKey<D>& key) const {
     if (key.kind != EventKind::pair) return particles_.radius[key.lo];
     return box_.steps.core_distance(particles_.id_of(key.lo), particles_.id_of(key.hi),
@@ -113,7 +131,7 @@ class RestCriterion {
     if (!pressed_.empty()) speed += length_ * pressed_[i];
     return kRounding * speed;
   }
-  /// The limits of a contact with this normal, of any length, and reaction. Nothing rests on a thermal wall.
+  /// The limits of a contact with this normal (contact_normal()) and reaction. Nothing rests on a thermal wall.
   RestLimits limits(const EventKey<D>& key, const Vec<D>& normal, double force, const Vec<D>& v_lo,
                     const Vec<D>& v_hi) const;
   /// The largest gap of this contact from which a slow approach stops, and with which it is held; 0 unless it

@@ -226,7 +226,7 @@ FlightEnd<D> SlabCore<D>::serve() {
     const EventKey<D>& key = event.key;
     const bool pair = key.kind == EventKind::pair;
     if (event.version_lo != version(key.lo) || (pair && event.version_hi != version(key.hi))) continue;
-    const StepSurface* const step = has_steps_ ? step_of(key) : nullptr;
+    const bool step = has_steps_ && crosses(key);
     // resolve() has handled contacts at the start; what is found again is rounding.
     if (!step && resolved_ && !(key.time > 0)) continue;
     if (!step && !box_.contacts.elastic() && at_the_end(key)) continue;
@@ -315,7 +315,7 @@ void SlabCore<D>::predict_pair(Id i, Id j, const Image<D>& image) {
                                 : contact_time<D>(d, v, a_[i] - a_[j], sigma, time_left, touching, slack);
   if (!(t + s < length_)) return;
   EventKey<D> key{.time = t + s, .kind = EventKind::pair, .lo = i, .hi = j, .image = image};
-  if (!held_.empty() && scan_->rests(key)) return;
+  if (!held_.empty() && scan_->rests(key) && !(steps && crosses(key))) return;
   key.generation = std::max(generation(i, key.time), generation(j, key.time));
   queue_.push_back({key, version(i), version(j)});
   if (!flights_.empty()) std::push_heap(queue_.begin(), queue_.end());
@@ -381,10 +381,18 @@ struct SlabCore<D>::Meeting {
     v_hi = core.velocity(key.hi, key.time);
     speed = normal.dot(v_lo - v_hi) / normal.norm();
     sigma = core.scan_->contact_distance(key.lo, key.hi);
+    hard.distance = sigma;
+    if (core.has_steps_) [[unlikely]]
+      hard = core.scan_->rest().surface(key, normal);
+    if (!hard.tether()) return;
+    normal = -normal;
+    speed = -speed;
   }
+  double gap() const { return hard.gap(normal.norm()); }  // of a pair
   Vec<D> v_lo, v_hi = v_lo, normal;
   double speed = 0;  // along the normal, negative if the gap closes
   double sigma = 0;
+  HardSurface hard;
 };
 
 /// Whether the spheres meet too slowly for an impact.
@@ -423,6 +431,7 @@ bool SlabCore<D>::at_the_end(const EventKey<D>& key) const {
   double gap_acceleration = 0;
   if (pair) {
     gap_acceleration = meeting.normal.dot(a - acceleration(key.hi)) / meeting.normal.norm();
+    if (meeting.hard.tether()) gap_acceleration -= (meeting.v_lo - meeting.v_hi).squaredNorm() / meeting.normal.norm();
   } else {
     const Wall<D> wall = box_.wall(key.hi);
     const Vec<D> x = position(key.lo, key.time);
@@ -431,7 +440,7 @@ bool SlabCore<D>::at_the_end(const EventKey<D>& key) const {
   if (time_left * (0.5 * time_left * std::max(0.0, -gap_acceleration) - meeting.speed) > most) return false;
   EventKey<D> at_end = key;
   at_end.time = length_;
-  if (pair) return Meeting(*this, at_end).normal.norm() - meeting.sigma >= -most;
+  if (pair) return Meeting(*this, at_end).gap() >= -most;
   const Wall<D> wall = box_.wall(key.hi);
   const Vec<D> x = position(key.lo, length_);
   return (wall.one_way ? wall.clearance(x, meeting.sigma, length_) : wall.gap(x, meeting.sigma, length_)) >= -most;
@@ -447,8 +456,7 @@ bool SlabCore<D>::falls_back(const EventKey<D>& key) {
   EventKey<D> at_start = key;
   at_start.time = 0;
   const Meeting meeting(*this, key), before(*this, at_start);
-  const double gap =
-      pair ? before.normal.norm() - before.sigma : box_.wall(key.hi).gap(particles_.x[key.lo], before.sigma);
+  const double gap = pair ? before.gap() : box_.wall(key.hi).gap(particles_.x[key.lo], before.sigma);
   const bool open = gap > scan_->tolerance(before.sigma);
   if (open ? gap > scan_->rest().widest_gap(key, before.normal) : !(before.speed > 0)) return false;
   return scan_->rest().falls_back(key, before.normal, (before.speed - meeting.speed) / key.time, before.speed);
@@ -508,7 +516,7 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     const StepSurface* const step = has_steps_ ? step_of(key) : nullptr;
     if (step ? step->tether() && !(d.dot(v) > 0) : !(d.dot(v) < 0)) return;
     const double m_lo = particles_.mass[key.lo], m_hi = particles_.mass[key.hi];
-    const auto impulse = step ? step_impulse<D>(*step, d, v, 1 / m_lo + 1 / m_hi)
+    const auto impulse = step ? step_impulse<D>(*step, box_.contacts, d, v, partner(lo), partner(hi))
                               : pair_impulse<D>(box_.contacts, d, v, partner(lo), partner(hi));
     impulse.apply(d, m_lo, lo.v, m_hi, hi.v);
     contact.impulse = impulse.on_first(d);

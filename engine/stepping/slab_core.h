@@ -134,6 +134,11 @@ class SlabCore {
   double step_time(const PairMotion<D>& motion, const PairSteps& steps, Id i, Id j, double time_left,
                    double slack) const;
   const StepSurface* step_of(const EventKey<D>& key) const;
+  /// Whether it is an event at a step of finite height; else it is a contact, of a tether from inside.
+  bool crosses(const EventKey<D>& key) const {
+    const StepSurface* const step = step_of(key);
+    return step && !step->tether();
+  }
   double end_after(const EventKey<D>& key) const;
   void predict_all(Id i);
   void predict_both(const EventKey<D>& key);

@@ -163,7 +163,10 @@ class Interpreter {
     if (const ValueTable* step = values_.find("step"))
       report(step->at, [&] {
         if (const std::string no = source_.integrator->refusal_of_steps(); !no.empty()) throw Error(Failure::deck, no);
-        if (source_.integrator->stepping && !values_.list("contact").empty())
+      });
+    for (const ValueTable& step : values_.list("step"))
+      report(step.at, [&] {
+        if (source_.integrator->stepping && step.given("range") && !values_.list("contact").empty())
           throw Error(Failure::deck, std::string(steps_and_laws));
       });
     if (const ValueTable* placement = values_.find("placement")) {

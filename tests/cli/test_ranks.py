@@ -121,7 +121,7 @@ STEPS = tomllib.loads(SPHERES) | {
     "output": {"directory": "unused", "frame_interval": 0.2, "thermo_interval": 0.05}}
 
 
-@pytest.mark.parametrize("method", ["free-flight", "psa", "edda"])
+@pytest.mark.parametrize("method", ["free-flight", "psa", "edda", "cdda"])
 def test_steps_on_ranks_at_all_vector_widths_and_after_a_kill(method, killer, tmp_path):
     charges = [] if method == "free-flight" else [{"type": "coulomb", "form": "damped-shifted", "damping": 0.8, "cutoff": 2.5}]
     plain = tmp_path / "plain"

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/ranks/system.h"
+#include "engine/stepping/rest_criterion.h"
 
 namespace carom::test {
 
@@ -17,6 +18,21 @@ struct Reaction {
   bool wall = true;  ///< whether `hi` is a wall
   double force = 0;
 };
+
+/// The reactions that a run with contacts at rest stores for its next step.
+template <int D>
+std::vector<Reaction> reactions_of(const System<D>& system) {
+  std::vector<carom::Reaction<D>> kept;
+  for (const auto& entry : system.fields.of_run()) {
+    if (entry.name != "reactions") continue;
+    Archive taken;
+    entry.archive(taken);
+    Archive(taken.bytes())(kept);
+  }
+  std::vector<Reaction> reactions;
+  for (const auto& [key, force] : kept) reactions.push_back({key.lo, key.hi, key.kind == EventKind::wall, force});
+  return reactions;
+}
 
 template <int D>
 struct StaticScene {

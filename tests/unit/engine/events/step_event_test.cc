@@ -115,7 +115,7 @@ TEST(StepEvent, ACrossingTakesExactlyItsEnergy) {
     const double range = 1.5, climb = trial % 3 == 0 ? 1e-9 : uniform(random), m_i = 0.5 + trial % 4, m_j = 1;
     const V d = range * V(uniform(random), uniform(random), uniform(random)).normalized();
     const V v_i(uniform(random), uniform(random), uniform(random)), v_j(uniform(random), uniform(random), 0);
-    const auto met = step_impulse<3>({.range = range, .climb = climb}, d, v_i - v_j, 1 / m_i + 1 / m_j);
+    const auto met = step_impulse<3>({.range = range, .climb = climb}, {}, d, v_i - v_j, {m_i, 0.5, 0}, {m_j, 0.5, 0});
     const V after_i = v_i + met.factor / m_i * d, after_j = v_j - met.factor / m_j * d;
     const double before = d.dot(v_i - v_j), after = d.dot(after_i - after_j);
     const double gained =
@@ -139,7 +139,7 @@ TEST(StepEvent, ACrossingTakesExactlyItsEnergy) {
 TEST(StepEvent, ATetherTurnsThePair) {
   const StepSurface tether{.range = 2, .of_contact = false, .climb = std::numeric_limits<double>::infinity()};
   const V d(2, 0, 0), v(0.5, 0.2, 0);
-  const auto met = step_impulse<3>(tether, d, v, 2);
+  const auto met = step_impulse<3>(tether, {}, d, v, {1, 0.5, 0}, {1, 0.5, 0});
   const V after = v + 2 * met.factor * d;
   EXPECT_NEAR(after[0], -0.5, 1e-15);
   EXPECT_EQ(after[1], 0.2);

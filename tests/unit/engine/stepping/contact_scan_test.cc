@@ -277,7 +277,9 @@ struct Column {
     criterion->stop_within(kick);
     criterion->begin_step(&a, 0.1);
     const EventKey<2> key{.kind = kind, .lo = lo, .hi = hi};
-    return criterion->limits(key, contact_normal<2>(system->box, key, system->particles.x), force, {0, 0}, {0, 0})
+    return criterion
+        ->limits(key, contact_normal<2>(system->box, system->particles, key, system->particles.x), force, {0, 0},
+                 {0, 0})
         .stopping;
   }
   double holding(double length) {

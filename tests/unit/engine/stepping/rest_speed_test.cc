@@ -31,7 +31,9 @@ struct Two {
   double resting(const EventKey<2>& key, double force = 0, Vec<2> v = Vec<2>::Zero()) const {
     return limits(key, force, v).resting;
   }
-  Vec<2> normal(const EventKey<2>& key) const { return contact_normal<2>(system->box, key, system->particles.x); }
+  Vec<2> normal(const EventKey<2>& key) const {
+    return contact_normal<2>(system->box, system->particles, key, system->particles.x);
+  }
 
   std::unique_ptr<System<2>> system;
   std::vector<Vec<2>> a;

@@ -47,21 +47,6 @@ void expect_balance(const System<D>& system, const std::vector<test::Reaction>& 
   EXPECT_LE(test::largest_difference<D>(left, std::vector<Vec<D>>(p.size(), Vec<D>::Zero())), error);
 }
 
-/// The reactions that the run stores for its next step.
-template <int D>
-std::vector<test::Reaction> reactions_of(const System<D>& system) {
-  std::vector<Reaction<D>> kept;
-  for (const auto& entry : system.fields.of_run()) {
-    if (entry.name != "reactions") continue;
-    Archive taken;
-    entry.archive(taken);
-    Archive(taken.bytes())(kept);
-  }
-  std::vector<test::Reaction> reactions;
-  for (const auto& [key, force] : kept) reactions.push_back({key.lo, key.hi, key.kind == EventKind::wall, force});
-  return reactions;
-}
-
 /// Expects the forces of these contacts to a relative error of 1e-10, and no other contact.
 void expect_reactions(std::vector<test::Reaction> found, std::vector<test::Reaction> expected) {
   const auto contact = [](const test::Reaction& each) { return std::tuple(each.wall, each.lo, each.hi); };
@@ -88,7 +73,7 @@ void expect_rest(const Case<D>& each, const std::string& method) {
   EXPECT_LE(s.max_energy_error, 1e-12 * s.energy_reference);
   EXPECT_LE(std::abs(s.energy_after_first_step - s.energy_initial), 1e-12 * s.energy_reference);
   EXPECT_LE(s.counters.max_overlap, 1e-12);
-  const auto reactions = reactions_of(run->system());
+  const auto reactions = test::reactions_of(run->system());
   double largest = 0;
   for (const auto& reaction : reactions) largest = std::max(largest, reaction.force);
   expect_balance(run->system(), reactions, 1e-10 * largest);
@@ -131,7 +116,7 @@ void expect_held_in_motion(std::unique_ptr<System<D>> system, const std::string&
   EXPECT_LE(s.max_momentum_error.value_or(0), 1e-14) << method;
   EXPECT_LE(s.counters.max_overlap, 1e-12) << method;
   EXPECT_EQ(s.counters.sphere_sphere + s.counters.sphere_wall, 0u) << method;
-  EXPECT_EQ(reactions_of(run->system()).size(), contacts) << method;
+  EXPECT_EQ(test::reactions_of(run->system()).size(), contacts) << method;
 }
 
 /// Two discs that attract each other and rotate about each other in contact, free or in a trap, which pulls the lighter
