@@ -204,6 +204,9 @@ DECK_ERRORS = {
     "step of an unknown species": (
         stepped('between = ["*", "ion"]\nrange = 1.5\ndepth = 1.0'), 9, ["'ion' is no species", "give one of"]),
     "tether between species": (stepped('between = ["*", "*"]\ntether = 1.5'), 9, ["'tether' joins listed pairs", "'pairs' or 'chain'"]),
+    "steps next to a law of contacts": (
+        stepped('between = ["*", "*"]\nrange = 1.5\ndepth = 1.0\n[[contact]]\nbetween = ["*", "*"]\nrestitution = 0.9'),
+        9, ["come to rest at the ranges", "take free-flight"]),
     "steps with cva": (
         stepped('between = ["*", "*"]\nrange = 1.5\ndepth = 1.0', "cva"), 9, ["'cva' does not know steps", "take one of: free-flight, psa, cdda, edda"]),
     "wall that is shaken without a frequency": (
