@@ -81,6 +81,10 @@ class ChordContacts {
         key.hi = wall.number;
         if (system_.particles.fixed(i) || scan_.rests(key)) continue;
         const double radius = system_.particles.radius[i];
+        if (wall.round > 0) {
+          judge_round_wall(wall, key, x[i], v[i], chord[i], v_end[i], radius, tau, end);
+          continue;
+        }
         judge_wall(key, wall.gap(x[i], radius), wall.opening(chord[i], 0.5 * tau), wall.opening(v[i]),
                    wall.opening(v_end[i], tau), radius, tau, scan_.rounding_speed(i, v[i]), end);
       }
@@ -157,6 +161,21 @@ class ChordContacts {
       end.touches = true;
     if (quotient < departing)
       end.contact = std::min(end.contact, std::max(0.0, departing) * tau / (departing - quotient));
+  }
+
+  /// A sphere meets a round wall as it meets another sphere, or as a pair meets its tether.
+  void judge_round_wall(const Wall<D>& wall, const EventKey<D>& key, const Vec<D>& x, const Vec<D>& v,
+                        const Vec<D>& chord, const Vec<D>& v_end, double radius, double tau, PieceEnd<D>& end) const {
+    const Vec<D> d = wall.from_centre(x), u = wall.across(chord);
+    const double reach = wall.reach(radius), slack = reach * scan_.rounding_speed(key.lo, v);
+    const auto judge_from = [&]<int kSide>() {
+      judge_pair<kSide>(key, d, d + tau * u, u, wall.across(v), wall.across(v_end), reach, scan_.tolerance(radius), tau,
+                        slack, end);
+    };
+    if (wall.inside)
+      judge_from.template operator()<-1>();
+    else
+      judge_from.template operator()<1>();
   }
 
   void judge_wall(const EventKey<D>& key, double gap, double u, double v, double v_end, double radius, double tau,

@@ -357,18 +357,29 @@ bool ContactScan<D>::hold_means(Positions<D> x, Positions<D> w_before, Vectors<D
   return press_apart(w, 2 / std::abs(length));
 }
 
-/// Where methods kick, spheres fly straight, and a pair that turns on its tether would be beyond it after the step: the
-/// rate at which it must come closer, times the length of its normal.
+/// Where methods kick, spheres fly straight, and a pair that turns on its tether, or a sphere that turns in a round
+/// wall, would be beyond it after the step: the rate at which it must come closer, times the length of the normal.
 template <int D>
-double ContactScan<D>::least_pull(const RestingContact<D>& contact, Positions<D> v) const {
-  if (contact.key.kind != EventKind::pair) return 0;
-  const HardSurface hard = rest_.surface(contact.key, contact.normal);
-  if (!hard.tether()) return 0;
-  const Vec<D> u = v[contact.key.lo] - v[contact.key.hi];
-  const double at = contact.normal.norm(), along = contact.normal.dot(u) / at, time = rest_.kick();
+double ContactScan<D>::least_pull(const RestingContact<D>& contact, Positions<D> x, Positions<D> v) const {
+  Vec<D> d, u;
+  double distance;
+  if (contact.key.kind == EventKind::pair) {
+    const HardSurface hard = rest_.surface(contact.key, contact.normal);
+    if (!hard.tether()) return 0;
+    d = -contact.normal;
+    u = v[contact.key.lo] - v[contact.key.hi];
+    distance = hard.distance;
+  } else {
+    const Wall<D> wall = box_.wall(contact.key.hi);
+    if (!(wall.round > 0 && wall.inside)) return 0;
+    d = wall.from_centre(x[contact.key.lo]);
+    u = wall.across(v[contact.key.lo]);
+    distance = wall.reach(particles_.radius[contact.key.lo]);
+  }
+  const double at = d.norm(), along = d.dot(u) / at, time = rest_.kick();
   const double across = time * time * std::max(0.0, u.squaredNorm() - along * along);
-  const double end = std::sqrt(std::max(0.0, hard.distance * hard.distance - across));
-  return at * std::max(0.0, at - end) / time;
+  const double end = std::sqrt(std::max(0.0, distance * distance - across));
+  return contact.normal.norm() * std::max(0.0, at - end) / time;
 }
 
 template <int D>
@@ -379,18 +390,17 @@ double ContactScan<D>::stop_approach(Positions<D> x, Vectors<D> v, double kick) 
     contact.slack = normal_slack(contact, v);
   }
   // The pulls of other tethers turn a pair faster: the problem is solved again until each bound suits the velocities.
-  const bool pulls = rest_.kicks() && !box_.steps.empty();
+  const bool pulls = rest_.kicks() && (!box_.steps.empty() || !box_.options.empty());
   const std::vector<Vec<D>> before(pulls ? v.begin() : v.end(), v.end());
   double lost = 0;
   for (int round = 0; round < (pulls ? kRoundsOfBraking : 1); ++round) {
     bool suits = round > 0;
     for (auto& contact : resting_) {
-      const double pull = pulls ? least_pull(contact, v) : 0;
-      if (round > 0 && pull > 0)
-        suits = suits && contact.normal.dot(v[contact.key.lo] - v[contact.key.hi]) >= pull * (1 - kRounding);
-      contact.bound = contact.key.kind == EventKind::wall ? wall_speed(contact.key)
-                      : round == 0                        ? pull
-                                                          : std::max(pull, contact.bound);
+      const bool wall = contact.key.kind == EventKind::wall;
+      const double pull = pulls ? least_pull(contact, x, v) : 0, bound = wall_speed(contact.key) + pull;
+      const Vec<D> u = wall ? v[contact.key.lo] : Vec<D>(v[contact.key.lo] - v[contact.key.hi]);
+      if (round > 0 && pull > 0) suits = suits && contact.normal.dot(u) >= pull * (1 - kRounding);
+      contact.bound = round == 0 ? bound : std::max(bound, contact.bound);
     }
     if (suits) break;
     std::ranges::copy(before, v.begin());

@@ -177,7 +177,7 @@ class ContactScan {
   double stop_rounding(Vectors<D> v) const;
   Vec<D> normal(const EventKey<D>& key, Positions<D> x) const { return contact_normal<D>(box_, particles_, key, x); }
   double least_opening(const RestingContact<D>& contact, Positions<D> v, Positions<D> a, double time_left) const;
-  double least_pull(const RestingContact<D>& contact, Positions<D> v) const;
+  double least_pull(const RestingContact<D>& contact, Positions<D> x, Positions<D> v) const;
   double normal_slack(const RestingContact<D>& contact, Positions<D> v) const;
   bool press_apart(Vectors<D> w, double force);
   double normal_speed(const Touch<D>& touch, Positions<D> v) const;

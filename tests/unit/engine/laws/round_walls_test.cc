@@ -150,22 +150,24 @@ TEST(RoundWalls, FeelThePressureOfAnIdealGas) {
 TEST(RoundWalls, ADiscThatSlidesIsAPendulum) {
   constexpr double kAngle = 1.0, kLength = 3.5;
   const double period = 4 * std::sqrt(kLength) * std::comp_ellint_1(std::sin(kAngle / 2));
-  for (const std::string method : {"edda", "cdda"})
+  for (const std::string method : {"edda", "cdda", "psa", "cva", "mcva"})
     for (const double step : {period / 400, period / 800}) {
       const Vec<2> start(5 + kLength * std::sin(kAngle), 5 - kLength * std::cos(kAngle));
       auto system = in_cavity<2>({start}, {{0, 0}});
       add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
       const auto run = test::run_until<2>(std::move(system), method, step, 2 * period);
       const auto& p = run->system().particles;
-      EXPECT_LT((p.x[0] - start).norm(), 20 * step * step) << method;
-      EXPECT_NEAR((p.x[0] - Vec<2>(5, 5)).norm(), kLength, 1e-9) << method;
-      EXPECT_LT(run->statistics().max_energy_error, 1e-12 * run->statistics().energy_reference) << method;
+      const bool exact = is_exact(method);
+      EXPECT_LT((p.x[0] - start).norm(), exact ? 20 * step * step : 4 * step) << method;
+      EXPECT_NEAR((p.x[0] - Vec<2>(5, 5)).norm(), kLength, exact ? 1e-9 : 1e-2) << method;
+      EXPECT_LT(run->statistics().max_energy_error, (exact ? 1e-12 : step) * run->statistics().energy_reference)
+          << method;
     }
 }
 
 /// Discs that lose energy come to rest in a bowl, beside each other, and the ledger closes.
 TEST(RoundWalls, DiscsComeToRestInABowl) {
-  for (const std::string method : {"edda", "cdda"}) {
+  for (const std::string method : {"edda", "cdda", "psa"}) {
     auto system = in_cavity<2>({{4, 3}, {6, 4}}, {{0.2, 0}, {0, 0}});
     test::set_law(*system, {{"restitution", 0.5}});
     add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
@@ -175,7 +177,7 @@ TEST(RoundWalls, DiscsComeToRestInABowl) {
     EXPECT_NEAR((p.x[0] - p.x[1]).norm(), 1, 1e-4) << method;
     const Statistics& s = run->statistics();
     EXPECT_GT(s.counters.dissipated.value(), 1) << method;
-    EXPECT_LT(s.max_energy_error, 1e-11 * s.energy_reference) << method;
+    EXPECT_LT(s.max_energy_error, (is_exact(method) ? 1e-11 : 1e-1) * s.energy_reference) << method;
   }
 }
 

@@ -95,7 +95,7 @@ TEST(Walls, EachIsThereOnce) {
   EXPECT_EQ(numbers(), (std::vector<Id>{0, 1}));
   box.add({.name = "x-", .temperature = 2});
   EXPECT_EQ(numbers(), (std::vector<Id>{0, 1}));
-  box.add({.name = "floor", .normal = {0, 1}, .offset = 1});
+  box.add({.name = "near", .normal = {1, 0}, .offset = 1});
   box.add({.name = "middle", .normal = {1, 0}, .offset = 6, .one_sided = false});
   EXPECT_EQ(numbers(), (std::vector<Id>{0, 1, 4, 5, 6}));
 }
