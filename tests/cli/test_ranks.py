@@ -143,15 +143,15 @@ def test_steps_on_ranks_at_all_vector_widths_and_after_a_kill(method, killer, tm
 CHAINS = {
     "format": 1,
     "title": "chains",
-    "system": {"dimension": 2, "box": [16.0, 24.0], "boundary": ["periodic", "wall"]},
+    "system": {"dimension": 2, "box": [16.0, 64.0], "boundary": ["periodic", "wall"]},
     "particles": [{"name": "links", "radius": 0.5,
-                   "position": [[1.5 + 1.15 * k + 0.03 * math.sin(7 * k + row), 2.0 + 2.5 * row + 0.02 * k] for row in range(6) for k in range(9)],
-                   "velocity": [[0.0, 0.0] for row in range(6) for k in range(9)]},
-                  {"name": "nails", "radius": 0.5, "fixed": True, "position": [[1.5 + 1.15 * 9, 2.2 + 2.5 * row] for row in range(6)]}],
+                   "position": [[1.5 + 1.15 * k + 0.03 * math.sin(7 * k + row), 2.0 + 2.5 * row + 0.02 * k] for row in range(24) for k in range(9)],
+                   "velocity": [[0.0, 0.0] for row in range(24) for k in range(9)]},
+                  {"name": "nails", "radius": 0.5, "fixed": True, "position": [[1.5 + 1.15 * 9, 2.2 + 2.5 * row] for row in range(24)]}],
     "contact": [{"between": ["*", "*"], "restitution": 0.4}],
-    "step": [{"pairs": [[9 * row + k, 9 * row + k + 1 if k < 8 else 54 + row] for row in range(6) for k in range(9)], "tether": 1.25}],
+    "step": [{"pairs": [[9 * row + k, 9 * row + k + 1 if k < 8 else 216 + row] for row in range(24) for k in range(9)], "tether": 1.25}],
     "interaction": [{"type": "uniform-field", "acceleration": [0.0, -1.0]}],
-    "run": {"end_time": 8.0},
+    "run": {"end_time": 3.0},
     "output": {"directory": "unused", "frame_interval": 0.5, "thermo_interval": 0.25}}
 
 
@@ -161,7 +161,7 @@ def test_steps_that_hold_chains_on_ranks_and_after_a_kill(method, killer, tmp_pa
     output = ["output.events=true", "output.checkpoint_wall=\"0\"", f"integrator.type={method}", "integrator.step=0.02"]
     run(deck, plain, output)
     found = summary(plain)
-    assert found["events"]["bounced"] > 200 and found["energy"]["dissipated"] > 0.3 * found["energy"]["reference"]
+    assert found["events"]["bounced"] > 500 and found["energy"]["dissipated"] > 0.05 * found["energy"]["reference"]
     if method != "psa":
         assert found["energy"]["max_abs_error"] < 1e-12 * found["energy"]["reference"]
     expect_same_anywhere(deck, output, plain, killer, (2, 3))
