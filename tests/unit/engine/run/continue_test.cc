@@ -296,7 +296,7 @@ Scene<D> obstructed(Scene<D> scene, bool valve) {
             for (Id i = 0; i < p.size(); i += 3) p.mass[i] = std::numeric_limits<double>::infinity(), p.v[i].setZero();
             if (!valve) return system;
             Vec<D> normal = Vec<D>::Unit(1);
-            normal[0] = 0.1;
+            if (!system->box.periodic(0)) normal[0] = 0.1;
             system->box.boundary[1] = Boundary::open;
             system->box.add({.name = "valve", .normal = normal, .offset = 0.4 * system->box.edges[1], .one_way = true});
             return system;
