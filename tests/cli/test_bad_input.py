@@ -90,7 +90,7 @@ DECK_ERRORS = {
     "wall with a normal of zeros": (walled('name = "ramp"\nnormal = [0, 0]'), 9, ["give a normal that is not zero"]),
     "wall with a normal in three dimensions": (
         walled('name = "ramp"\nnormal = [0, 0, 1]'), 9, ["a normal of 3 numbers", "give 2"]),
-    "face with a normal": (walled('name = "y+"\nnormal = [0, 1]'), 9, ["'y+' is a face of the box", "leave normal"]),
+    "face with a normal": (walled('name = "y+"\nnormal = [0, 1]'), 9, ["'y+' is a face of the box", "leave shape, normal"]),
     "wall across a periodic axis": (
         walled('name = "lid"\nnormal = [1, 0]').replace('["wall", "wall"]', '["periodic", "wall"]'),
         9, ["the wall 'lid' is not the same in all images", "make that boundary wall or open"]),
@@ -116,8 +116,6 @@ DECK_ERRORS = {
     "plane with a radius": (walled('name = "lid"\nnormal = [0, 1]\nradius = 5'), 9, ["is a plane and has keys of a round wall"]),
     "motion that ends before the start": (
         walled('name = "y+"\nvelocity = 0.1\nuntil = -1'), 12, ["'until' must be zero or positive (is -1)"]),
-    "spheres outside of a cavity": (
-        walled('name = "cavity"\nshape = "sphere"\ncentre = [5, 5]\nradius = 3'), 5, ["not inside the walls", "'cavity'"]),
     "fixed particles with velocities": (
         changed("mass = 1.0", "mass = 1.0\nfixed = true"), 12, ["'velocity' of fixed particles", "leave it out"]),
     "fixed particles with a temperature": (
@@ -344,6 +342,9 @@ IMPOSSIBLE_STATES = {
     "wall that runs into a sphere": (
         walled('name = "ramp"\nnormal = [2, 0]\noffset = 4.5'),
         ["1 sphere is not inside the walls", "particle 0", "0.75 beyond the wall 'ramp'"]),
+    "outside of a cavity": (
+        walled('name = "cavity"\nshape = "sphere"\ncentre = [5, 5]\nradius = 3'),
+        ["1 sphere is not inside the walls", "particle 0", "0.5 beyond the wall 'cavity'"]),
     "periodic box too small": (
         changed('["wall", "wall"]', '["wall", "periodic"]').replace("[10.0, 10.0]", "[10.0, 0.9]").replace("5.0]", "0.45]"),
         ["the periodic box is 0.9 long on axis 1, less than a diameter of 1"]),
