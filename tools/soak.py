@@ -217,7 +217,7 @@ def random_deck(dice, seconds):
     if any("tangential" in law for law in contacts) and dice.random() < 0.7:
         particles[0] |= {"rotational_temperature": dice.uniform(0, 2.0), "inertia": dice.uniform(0.1, 0.6)}
     steps = random_steps(dice, lattice, count, [each["name"] for each in particles]) \
-        if method in ("free-flight", "psa", "edda") and dice.random() < 0.4 else []
+        if method in ("free-flight", "psa", "edda", "cdda") and dice.random() < 0.4 else []
     if method in ("cdda", "edda") and (dice.random() < 0.4):
         integrator["accuracy"] = dice.choice([1e-2, 1e-3, 1e-4])
     return {"format": 1, "system": {"dimension": dimension, "boundary": boundary},

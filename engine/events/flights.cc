@@ -162,8 +162,9 @@ double Flights<D>::wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall)
   const bool approaches = s == 0 && wall.at(r.x).opening(r.v, r.t) - rate < -slack;
   if (s == 0 && !approaches && !wall.thermal())
     throw Error(Failure::numerical,
-                "particle " + std::to_string(r.id) + " rests on " + box_.wall_name(wall.number) +
-                    " under the uniform field and would bounce without end; give it a height or a velocity");
+                "particle " + std::to_string(r.id) + " rests or slides on " + box_.wall_name(wall.number) +
+                    " and would bounce without end in free flight; take edda, which holds it, or give it a height or "
+                    "a velocity away from the wall");
   return r.t + s;
 }
 

@@ -107,7 +107,7 @@ class CollisionDiscreteDerivative : public Integrator<D> {
     auto& p = system.particles;
     const Id lo = arrival.key.lo, hi = arrival.key.hi;
     const Vec<D> d = p.x[lo] - p.x[hi] + system.box.shift(arrival.key.image), v = p.v[lo] - p.v[hi];
-    if (arrival.side * d.dot(v) > 0) return;
+    if (arrival.side * d.dot(v) >= 0) return;
     const auto partner = [&](Id i) { return Partner<D>{p.mass[i], p.radius[i], p.species[i]}; };
     const PairImpulse<D> impulse = step_impulse<D>(*arrival.step, system.box.contacts, d, v, partner(lo), partner(hi));
     impulse.apply(d, p.mass[lo], p.v[lo], p.mass[hi], p.v[hi]);

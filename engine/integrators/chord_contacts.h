@@ -62,7 +62,7 @@ class ChordContacts {
       const Vec<D> d = x[i] - x[j] + system_.box.shift(pair.image), u = chord[i] - chord[j];
       if (has_steps) [[unlikely]]
         if (const PairSteps* const steps = scan_.steps(i, j)) {
-          judge_steps(key, *steps, d, u, v, piece, tau, end);
+          judge_steps(key, *steps, d, u, x, v, piece, tau, end);
           continue;
         }
       const double sigma = system_.particles.radius[i] + system_.particles.radius[j];
@@ -102,13 +102,19 @@ class ChordContacts {
     end.violator = key;
   }
 
+  /// The rounding of the distance of two positions, which may be far outside an open box.
+  double rounding_at(const Vec<D>& a, const Vec<D>& b) const {
+    const double farthest = std::max(a.cwiseAbs().maxCoeff(), b.cwiseAbs().maxCoeff());
+    return std::max(scan_.tolerance(0), GapTolerance(farthest)(0));
+  }
+
   /// A pair with steps, at the surfaces that it can reach next.
-  void judge_steps(const EventKey<D>& key, const PairSteps& steps, const Vec<D>& d, const Vec<D>& u, Positions<D> v,
-                   const DiscreteGradient<D>& piece, double tau, PieceEnd<D>& end) {
+  void judge_steps(const EventKey<D>& key, const PairSteps& steps, const Vec<D>& d, const Vec<D>& u, Positions<D> x,
+                   Positions<D> v, const DiscreteGradient<D>& piece, double tau, PieceEnd<D>& end) {
     const auto& radius = system_.particles.radius;
     const auto &x_end = piece.x(), &v_end = piece.v();
     const Id i = key.lo, j = key.hi;
-    const double sigma = radius[i] + radius[j], rounding = scan_.tolerance(0);
+    const double sigma = radius[i] + radius[j], rounding = rounding_at(x[i], x[j]);
     const double far = steps.farthest(sigma) + scan_.tolerance(sigma) + 2 * tau * u.norm();
     if (d.squaredNorm() > far * far) return;
     const Vec<D> d_end = x_end[i] - x_end[j] + system_.box.shift(key.image);  // as the next piece computes it
@@ -124,8 +130,11 @@ class ChordContacts {
       const double distance = surface.distance(sigma), gap = kSide * (d_end.norm() - distance);
       // On a tangent a pair is outside.
       const double slack = kSide * approach_slack(sigma, v_end[i].norm(), v_end[j].norm());
-      judge_pair<kSide>(key, d, d_end, u, v_start, v_last, distance, rounding, tau, slack, end);
-      if (std::abs(gap) <= rounding && kSide * d_end.dot(v_last) < -slack) arrivals_.push_back({key, &surface, kSide});
+      const double rounding_last = rounding_at(x_end[i], x_end[j]);  // as the next piece computes it
+      judge_pair<kSide>(key, d, d_end, u, v_start, v_last, distance, std::min(rounding, rounding_last), tau, slack,
+                        end);
+      if (std::abs(gap) <= rounding_last && kSide * d_end.dot(v_last) < -slack)
+        arrivals_.push_back({key, &surface, kSide});
     };
     if (passed == 0)
       hard.template operator()<1>(steps.core_distance(sigma));

@@ -11,6 +11,9 @@ namespace {
 /// The longest step, in periods of a shaken wall: its largest speed is wrong by (2π·0.1)²/12, 3 %.
 constexpr double kLongestStep = 0.1;
 
+/// A wall counts as parallel to an axis if its unit vector is off by no more than the rounding of a sine or cosine.
+constexpr double kParallel = 1e-15;
+
 /// The names of the faces, by number.
 template <int D>
 std::vector<std::string> face_names() {
@@ -29,7 +32,7 @@ void check_round(WallOptions<D>& wall, const auto& refuse) {
   if (!wall.one_sided || wall.one_way)
     refuse("is round and lets spheres be on both sides",
            "leave one_sided and one_way out, and take two walls, inside = true and inside = false");
-  if (const double length = wall.direction.norm(); length > 0) wall.direction /= length;
+  if (const double length = wall.direction.stableNorm(); length > 0) wall.direction /= length;
 }
 
 }  // namespace
@@ -77,10 +80,17 @@ void Box<D>::add(WallOptions<D> wall) {
       wall.normal /= length;
       wall.offset /= length;
     }
-    for (int k = 0; k < D; ++k)
-      if (periodic(k) && (wall.round > 0 ? std::abs(wall.direction[k]) != 1 : wall.normal[k] != 0))
+    for (int k = 0; k < D; ++k) {
+      if (!periodic(k)) continue;
+      // What points out of a parallel wall: along the axis of the box, or of a cylinder, across it.
+      Vec<D>& vector = wall.round > 0 ? wall.direction : wall.normal;
+      Vec<D> off = vector[k] * Vec<D>::Unit(k);
+      if (wall.round > 0) off = vector - off;
+      if (!(off.norm() < kParallel) || (wall.round > 0 && vector.isZero(0)))
         refuse("is not the same in all images of the box along axis " + std::to_string(k) + ", which is periodic",
                "make that boundary wall or open, or give a wall that is parallel to the axis");
+      vector -= off;
+    }
     wall.number = 2 * D;
     for (const WallOptions<D>& each : options)
       if (each.number >= 2 * D) wall.number = each.number + (each.one_sided ? 1 : 2);
@@ -112,11 +122,11 @@ std::vector<Wall<D>> Box<D>::walls() const {
   return all;
 }
 
-/// Sets where the wall is and how it moves. In a step of length h a shaken wall moves on a parabola. That of an
+/// Sets where the wall is and how it moves. In a step of length h a shaken wall moves on a parabola. The parabola of an
 /// oscillator with the acceleration −Ω²(X + X')/2, where X and X' are its positions at the two ends and Ω =
 /// (2/h)·tan(πfh), has the positions of the sine at the ends of all steps and a continuous velocity, of order 2. Where
-/// spheres fly straight, it moves straight too: a sphere that is carried along neither sinks in nor gets ahead. So it
-/// does in the step in which its motion ends; in free flight an epoch ends then.
+/// spheres fly straight, it moves straight too: a sphere that is carried along neither sinks in nor gets ahead. In a
+/// step of fixed length in which its motion ends, any wall moves straight; other slabs end when the motion ends.
 template <int D>
 void Box<D>::set_motion(const WallOptions<D>& its, Wall<D>& wall) const {
   if (its.rests(step_start)) {
@@ -166,14 +176,15 @@ void Box<D>::restart() {
 template <int D>
 double Box<D>::longest_step() const {
   double highest = 0;
-  for (const WallOptions<D>& each : options) highest = std::max(highest, each.frequency);
+  for (const WallOptions<D>& each : options)
+    if (!each.rests(time)) highest = std::max(highest, each.frequency);
   return kLongestStep / highest;
 }
 
 template <int D>
 void Box<D>::check(Failure failure) const {
   for (const WallOptions<D>& each : options)
-    if (each.frequency * step > kLongestStep)
+    if (each.frequency * step > kLongestStep && !each.rests(step_start))
       throw Error(failure, wall_name(each.number) + " is shaken with the period " + short_text(1 / each.frequency) +
                                ", too short for steps of " + short_text(step) + "; take a step of at most " +
                                short_text(kLongestStep / each.frequency));

@@ -27,7 +27,7 @@ struct Wall {
   Id number = 0;  ///< in event keys and files: 2·axis for the lower face of the box, 2·axis + 1 for the upper one, 2·D
                   ///< and more for further walls
   int axis = -1;                   ///< a face of the box is normal to this axis; −1: a further wall
-  Vec<D> normal = Vec<D>::Zero();  ///< unit vector into the space of the spheres; of a plane
+  Vec<D> normal = Vec<D>::Zero();  ///< unit vector of a plane, into the space of the spheres
   bool one_sided = true;           ///< false: does not act on spheres whose centres are behind the plane
   bool one_way = false;            ///< acts only on spheres that are wholly in front; others pass
   double depth = 0;         ///< one_way: a sphere that is deeper in the plane by rounding still counts as in front
@@ -39,7 +39,7 @@ struct Wall {
   double turns = 0;         ///< phase of the sine at time 0, in turns
   double temperature = 0;   ///< a thermal wall has one [energy]; 0: the wall is not thermal
   std::uint64_t seed = 1;   ///< seed of the random numbers of a thermal wall
-  double round = 0;         ///< radius of a sphere or cylinder; 0: a plane [length]
+  double round = 0;         ///< the radius of a wall that is a sphere or cylinder; 0: it is a plane [length]
   bool inside = true;       ///< the spheres are inside a round wall; false: outside
   Vec<D> centre = Vec<D>::Zero();     ///< of a round wall; of a cylinder: any point of its axis [length]
   Vec<D> direction = Vec<D>::Zero();  ///< unit vector along a cylinder; zero: a sphere

@@ -101,7 +101,7 @@ template <int D>
 std::string no_room(const Box<D>& box, double diameter) {
   const auto all = box.walls();
   for (const Wall<D>& wall : all)
-    if (wall.round > 0 && wall.inside && 2 * wall.round < diameter - box.gap_tolerance()(diameter))
+    if (wall.round > 0 && wall.inside && diameter > 0 && 2 * wall.round <= diameter + box.gap_tolerance()(diameter))
       return box.wall_name(wall.number) + " has the diameter " + short_text(2 * wall.round) +
              " and no room for a diameter of " + short_text(diameter) + " inside; enlarge it";
   for (std::size_t i = 0; i < all.size(); ++i)

@@ -110,11 +110,10 @@ void check_rates(const Box<D>& box, const Slab& slab, bool stepping) {
                                                         short_text(kMostKicks / slab.length)
                                                   : "; take a smaller rate"));
   for (const WallOptions<D>& each : box.options)
-    if (each.frequency * end > kMostOscillations)
+    if (const double oscillations = each.frequency * std::min(end, each.until); oscillations > kMostOscillations)
       throw Error(Failure::numerical,
-                  box.wall_name(each.number) + " would oscillate " + short_text(each.frequency * end) +
-                      " times until time " + short_text(end) +
-                      ", so often that its phase is lost to rounding; take a frequency of at most " +
+                  box.wall_name(each.number) + " would oscillate " + short_text(oscillations) + " times until time " +
+                      short_text(end) + ", so often that its phase is lost to rounding; take a frequency of at most " +
                       short_text(kMostOscillations / end) + ", or end the run earlier");
 }
 
@@ -294,11 +293,7 @@ void Simulation<D>::run(const Hooks& hooks) {
       break;
     }
     if (done) break;
-    Slab slab = clock_.next_slab(s);
-    if (const double left = system_->box.next_end(slab.start) - slab.start; !info_.stepping && left < slab.length) {
-      slab.length = left;
-      slab.ends_step = false;
-    }
+    Slab slab = next_slab();
     s.counters.divisions += system_->decomposition.divide_if_due(slab.index, slab.length);
     const std::vector<double> due = info_.stepping ? std::vector<double>{} : monitor_->due_within(slab);
     contacts.clear();
@@ -340,6 +335,18 @@ void Simulation<D>::run(const Hooks& hooks) {
   take_time();
 }
 
+/// The next slab of the clock; where its length is free, it ends no later than the motion of a wall.
+template <int D>
+Slab Simulation<D>::next_slab() const {
+  Slab slab = clock_.next_slab(statistics_);
+  const double left = system_->box.next_end(slab.start) - slab.start;
+  if ((!info_.stepping || clock_.adapts()) && left < slab.length) {
+    slab.length = left;
+    slab.ends_step = false;
+  }
+  return slab;
+}
+
 /// Advances the system by a slab, and repeats it with a wider halo, or made shorter, if needed; false: the slab was
 /// abandoned, and the state is that of its start.
 template <int D>
@@ -348,7 +355,9 @@ bool Simulation<D>::fly(Slab& slab, SlabReport<D>& report, SlabWatch& watch) {
   const double diameter = info_.hard_cores && !system_->box.plain() ? 2 * largest_radius(*system_) : 0;
   const auto no_room_text = [&](double after) {
     system_->box.begin_step(slab.start + after, 0);
-    return diameter > 0 ? no_room(system_->box, diameter) : "";
+    std::string what = diameter > 0 ? no_room(system_->box, diameter) : "";
+    system_->box.begin_step(slab.start, info_.stepping ? slab.length : 0);
+    return what;
   };
   const auto error = [&](const std::string& what) {
     return Error(Failure::numerical,
@@ -380,7 +389,7 @@ bool Simulation<D>::fly(Slab& slab, SlabReport<D>& report, SlabWatch& watch) {
       report.error = {};
       if (report.contacts) report.contacts->clear();
       clock_.shorten(slab, wanted);
-      slab = clock_.next_slab(statistics_);
+      slab = next_slab();
     } catch (SlabLeft) {
       watch.restore();
       report.counters = before;

@@ -61,7 +61,7 @@ struct EndlessRun {
 /// Why methods with steps refuse steps of finite height next to a law of contacts.
 inline constexpr std::string_view steps_and_laws =
     "where contacts lose energy, pairs come to rest at the ranges of wells and shoulders, and methods with steps of "
-    "time cannot hold them there; leave [[contact]] or the ranges out, or take free-flight; tethers and cores may stay";
+    "time cannot hold them there; leave out [[contact]] or each 'range', or take free-flight";
 
 /// Checks the ends of a plan. `info`: the method, null if it is unknown; `ramp`: the bath has a ramp without times.
 EndlessRun endless(const Plan& plan, const IntegratorInfo* info, bool ramp);
@@ -299,6 +299,7 @@ class Simulation {
       : Simulation(std::move(system), info, std::move(p.integrator), p.plan) {}
 
   void begin(const Hooks& hooks);
+  Slab next_slab() const;
   bool fly(Slab& slab, SlabReport<D>& report, SlabWatch& watch);
   void act_of_bath(const Slab& slab, double complete, SlabReport<D>& report);
   void adapt(const Slab& slab, const SlabReport<D>& report, std::uint64_t contacts, double complete);

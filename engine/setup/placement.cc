@@ -224,7 +224,8 @@ Outsiders find_outsiders(const Box<D>& box, std::span<const Vec<D>> x, std::span
     if (!fixed.empty() && fixed[i] != 0) continue;
     bool outside = false;
     for (const Wall<D>& wall : walls) {
-      const double depth = -wall.gap(x[i], radius[i]);
+      const bool fits = wall.round == 0 || !wall.inside || wall.reach(radius[i]) > tolerance(radius[i]);
+      const double depth = fits ? -wall.gap(x[i], radius[i]) : radius[i];  // a sphere that fills a cavity cannot move
       if (depth <= tolerance(radius[i])) continue;
       outside = true;
       if (depth <= found.depth) continue;

@@ -315,7 +315,7 @@ double ContactScan<D>::least_opening(const RestingContact<D>& contact, Positions
   if (key.kind != EventKind::pair) {
     const Wall<D> wall = box_.wall(key.hi);
     double bend = 0;
-    if (wall.round > 0) {  // as for a pair; inside, the terms have the other sign, and the one with a² counts
+    if (wall.round > 0) {  // the terms of a pair; inside, their signs are reversed, and the term in a² presses too
       const Vec<D> u = wall.across(v[key.lo]), b = wall.across(a[key.lo]);
       const double turn = (wall.inside ? 1 : -1) * u.dot(b) * time_left;
       bend = std::max(0.0, turn) +

@@ -106,10 +106,13 @@ void place_at_random(const Deck::Source& source, const std::vector<Id>& placed, 
            "give a smaller placement.distance, or leave it out");
   refuse(source.placement.at,
          "random insertion found no place for sphere " + of +
-             " (packing fraction wanted: " + std::to_string(packing_fraction<D>(box.volume(), radius)) + ")",
-         "take type = \"compressed\" or a lattice, a larger box or fewer spheres; insertion jams at a packing fraction "
-         "of " +
-             jammed);
+             " (packing fraction wanted: " + std::to_string(packing_fraction<D>(box.volume(), radius)) +
+             (box.plain() ? ")" : " of the box, part of which is behind walls)"),
+         box.has(Boundary::open)
+             ? "take fewer or smaller spheres, or make the boundaries walls and take type = \"compressed\""
+             : "take type = \"compressed\" or a lattice, a larger box or fewer spheres; insertion jams at a packing "
+               "fraction of " +
+                   jammed);
 }
 
 template <int D>

@@ -294,6 +294,7 @@ void Session<D>::set_wall(Parameters given) {
     const bool stays = given.has("velocity") && !given.has("moved");
     Parameters changed = old->values;
     if (stays) changed.set("phase", 0.0), changed.set("moved", 0.0);
+    if (given.has("velocity")) changed.erase("until");  // of the motion before
     for (const auto& [key, value] : given.all()) changed.set(key, value);
     *old = table_of("wall", std::move(changed));
     if (stays) {

@@ -246,6 +246,23 @@ def test_walls_move_and_stay_where_they_are_in_the_next_run():
         sim.add_wall("x-", normal=[1, 0])
 
 
+def test_a_motion_that_ends_and_a_new_one():
+    sim = carom.Simulation(box=[10, 6])
+    sim.add_particles([[2, 3]], velocity=[[0, 0]], radius=0.5)
+    sim.add_wall("x+", velocity=0.25, until=4)
+    sim.add_wall("post", shape="sphere", centre=np.array([8.0, 3.0]), radius=0.5, inside=False)
+    sim.integrator("edda", step=0.05)
+    sim.run(time=8)
+    wall = sim.walls[0]
+    assert wall["moved"] == pytest.approx(1) and wall["until"] == 0
+    sim.add_wall("x+", velocity=0.5)
+    assert "until" not in sim.walls[0]
+    sim.run(time=2)
+    assert sim.walls[0]["moved"] == pytest.approx(2)
+    with pytest.raises(carom.UsageError, match="leave 'radius' out"):
+        sim.add_wall("post", radius=1.0)
+
+
 def in_moving_walls():
     """Two discs under a field between a shaken floor and a moving ramp."""
     sim = carom.Simulation(box=[10, 10], boundary="wall")

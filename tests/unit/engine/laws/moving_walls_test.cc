@@ -98,6 +98,29 @@ TEST(MovingWalls, StopAtTheirTime) {
     }
 }
 
+/// Steps that the method chooses end when the motion of a wall ends, so that it never moves at a mean speed.
+TEST(MovingWalls, StopBetweenChosenSteps) {
+  const auto end = [](const std::string& method, double accuracy) {
+    auto system = test::make_system<2>({12, 4}, Boundary::wall, {{2, 2}, {10.2, 3}}, {{0.5, 0.3}, {0.3, 0.1}});
+    system->box.add({.name = "x+", .velocity = 0.25, .until = 2.4});  // it meets the second disc at 2.36
+    auto run = test::make_run<2>(std::move(system), method, {.step = 0.1, .accuracy = accuracy, .end_time = 6});
+    run->run();
+    EXPECT_NE(run->statistics().counters.work.value(), 0) << method;
+    return run->system().particles.x[1];
+  };
+  const Vec<2> exact = end("free-flight", 0);
+  for (const std::string method : {"edda", "cdda"}) EXPECT_LT((end(method, 1e-2) - exact).norm(), 1e-12) << method;
+}
+
+/// The motion of a wall that is over limits no step, and its oscillations are those that it has made.
+TEST(MovingWalls, AreForgottenWhenTheyHaveStopped) {
+  auto system = test::make_system<2>({12, 4}, Boundary::wall, {{2, 2}}, {{0.5, 0.3}});
+  system->box.add({.name = "x+", .amplitude = 0.1, .frequency = 1e7, .until = 0});
+  EXPECT_EQ(system->box.longest_step(), std::numeric_limits<double>::infinity());
+  const auto run = test::run_until<2>(std::move(system), "edda", 0.1, 1000);
+  EXPECT_GT(run->statistics().counters.sphere_wall, 20u);
+}
+
 /// The first contact against steps of 10⁻⁴.
 TEST(ShakenContact, IsTheFirst) {
   int found = 0;

@@ -201,6 +201,25 @@ TEST(RoundWalls, HaveTheLawsOfPlanes) {
   }
 }
 
+TEST(RoundWalls, TakeAnAxisOfAnyLength) {
+  for (const double length : {1e200, 1.0, 1e-200}) {
+    auto system = test::make_system<3>({10, 10, 10}, Boundary::open, {{5, 5, 5}}, {{0, 0, 1}});
+    add(*system, {{"name", std::string("tube")},
+                  {"shape", std::string("cylinder")},
+                  {"centre", std::vector{5.0, 5.0, 5.0}},
+                  {"axis", std::vector{0.0, 0.0, length}},
+                  {"radius", 3.0}});
+    EXPECT_EQ(system->box.wall(6).direction, Vec<3>(0, 0, 1));
+  }
+}
+
+TEST(RoundWalls, NeedRoomForASphereToMove) {
+  EXPECT_NE(test::message_of([] {
+              test::run_until<2>(in_cavity<2>({{5, 5}}, {{0.1, 0}}, {{"radius", 0.5}}), "free-flight", 1, 1);
+            }).find("beyond the wall 'cavity'"),
+            std::string::npos);
+}
+
 std::string refusal(Parameters given) {
   return test::message_of([&] { in_cavity<3>({{5, 5, 5}}, {{0, 0, 0}}, given); });
 }

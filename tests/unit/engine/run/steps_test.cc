@@ -368,5 +368,18 @@ TEST(Langevin, EachSpeciesHasItsFriction) {
   EXPECT_NEAR(run->system().particles.v[1][1], 1000 * std::exp(-3.0), 1e-3);
 }
 
+/// Positions far outside an open box are rounded more; a pair that crosses a well there is not lost.
+TEST(Steps, AreFoundFarFromTheBox) {
+  for (const std::string method : {"free-flight", "psa", "edda", "cdda"})
+    for (const double far : {0.1, 10.1, 1000.1, 10000.1}) {
+      auto system = test::make_system<3>({1, 1, 1}, Boundary::open, {{far, 0, 0}, {far + 2.03, 0.3, 0}},
+                                         {{0.37, 0, 0}, {-0.41, 0, 0}}, {0.5, 0.5});
+      add(*system, {{"between", std::vector<std::string>{"*", "*"}}, {"range", 1.5}, {"depth", 1.0}});
+      const auto run = test::run_until<3>(std::move(system), method, 0.05, 10);
+      EXPECT_EQ(run->statistics().counters.steps.entered, 1u) << method << far;
+      EXPECT_EQ(run->statistics().counters.steps.left, 1u) << method << far;
+    }
+}
+
 }  // namespace
 }  // namespace carom::steps_run_test
