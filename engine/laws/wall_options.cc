@@ -68,7 +68,7 @@ void add_wall(Box<D>& box, const Parameters& given, std::uint64_t seed) {
     return true;
   };
   vector("normal", wall.normal);
-  const std::string shape = given.text("shape");
+  const std::string& shape = given.text("shape");
   const bool cylinder = shape == "cylinder";
   if (cylinder && D == 2) refuse("is a cylinder in two dimensions", "give shape = \"sphere\", which is a circle there");
   const bool has_centre = vector("centre", wall.centre), has_axis = vector("axis", wall.direction);

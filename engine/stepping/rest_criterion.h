@@ -84,9 +84,9 @@ HardSurface hard_surface(const Box<D>& box, const Particles<D>& p, Id i, Id j, d
 template <int D>
 Vec<D> contact_normal(const Box<D>& box, const Particles<D>& p, const EventKey<D>& key, Positions<D> x) {
   if (key.kind == EventKind::wall) return box.wall(key.hi).at(x[key.lo]).normal;
-  const Vec<D> d = x[key.lo] - x[key.hi] + box.shift(key.image);
-  if (box.steps.empty()) return d;
-  return hard_surface(box, p, key.lo, key.hi, d.norm()).side * d;
+  Vec<D> d = x[key.lo] - x[key.hi] + box.shift(key.image);
+  if (!box.steps.empty()) d *= hard_surface(box, p, key.lo, key.hi, d.norm()).side;
+  return d;
 }
 
 template <int D>

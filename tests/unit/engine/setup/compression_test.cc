@@ -54,6 +54,20 @@ void expect_reached(const std::vector<double>& radius, double fraction, std::arr
   expect_sound<D>(box, radius, compress<D>(box, radius, options));
 }
 
+/// Spheres grow in a cavity, whose surface comes nearer to their centres, and around a rod.
+TEST(Compression, FillsACavityAroundARod) {
+  Box<3> box{.edges = {8, 8, 8}, .boundary = {W, W, W}};
+  box.add({.name = "cavity", .round = 4, .centre = {4, 4, 4}});
+  box.add({.name = "rod", .round = 0.5, .inside = false, .centre = {4, 4, 4}, .direction = {0, 0, 1}});
+  const std::vector<double> radius(220, 0.5);  // half of the cavity
+  const Compression<3> done = compress<3>(box, radius, {.seed = 2});
+  expect_sound<3>(box, radius, done);
+  for (const Vec<3>& x : done.x) {
+    EXPECT_GE(box.wall(6).gap(x, 0.5), 0);
+    EXPECT_GE(box.wall(7).gap(x, 0.5), 0);
+  }
+}
+
 TEST(Compression, ReachesRandomClosePackingOfEqualSpheres) {
   expect_reached<3>(std::vector<double>(100, 0.5), 0.64, {P, P, P}, {.seed = 3});
 }
