@@ -54,7 +54,7 @@ void expect_reached(const std::vector<double>& radius, double fraction, std::arr
   expect_sound<D>(box, radius, compress<D>(box, radius, options));
 }
 
-/// Spheres grow in a cavity, whose surface comes nearer to their centres, and around a rod.
+/// The radii grow inside a cavity and outside a rod, where the distance at which a sphere touches shrinks and grows.
 TEST(Compression, FillsACavityAroundARod) {
   Box<3> box{.edges = {8, 8, 8}, .boundary = {W, W, W}};
   box.add({.name = "cavity", .round = 4, .centre = {4, 4, 4}});
