@@ -7,8 +7,8 @@
 // the start has the trivial contact τ = 0. The function gap(τ)/τ ≈ (2 d·v̄ + τ v̄²)/2σ does not have this zero: it starts
 // at the velocity of separation and falls through zero where the pair meets again.
 //
-// A pair inside a step or a tether meets it from inside: there the gap and its rates have the other sign. On which side
-// of a step a pair is at the start says step_event.h. A pair that is on another side at the end of a piece, within the
+// A pair inside a step or a tether meets it from inside: there the gap and its rates have the other sign. step_event.h
+// says on which side of a step a pair is at the start. A pair that is on another side at the end of a piece, within the
 // tolerance, has arrived at the step, and its event is due at once, since nothing else is stored about its side.
 
 #include <algorithm>
@@ -69,8 +69,8 @@ class ChordContacts {
       const double reach = sigma + tau * u.norm() + scan_.tolerance(sigma);
       if (d.squaredNorm() > reach * reach * kProlongation || scan_.rests(key)) continue;
       const double slack = sigma * (scan_.rounding_speed(i, v[i]) + scan_.rounding_speed(j, v[j]));
-      judge_pair<1>(key, d, d + tau * u, u, v[i] - v[j], v_end[i] - v_end[j], sigma, scan_.tolerance(sigma), tau, slack,
-                    end);
+      judge_pair(key, 1, d, d + tau * u, u, v[i] - v[j], v_end[i] - v_end[j], sigma, scan_.tolerance(sigma), tau, slack,
+                 end);
     }
     std::ranges::sort(arrivals_, {}, &Arrival<D>::key);
     key.kind = EventKind::wall;
@@ -121,40 +121,38 @@ class ChordContacts {
     const Vec<D> v_start = v[i] - v[j], v_last = v_end[i] - v_end[j];
     const std::size_t passed =
         steps_passed<D>(steps, {d, v_start}, sigma, rounding, approach_slack(sigma, v[i].norm(), v[j].norm()));
-    const auto hard = [&]<int kSide>(double distance) {
+    const auto hard = [&](double side, double distance) {
       if (scan_.rests(key)) return;
       const double slack = sigma * (scan_.rounding_speed(i, v[i]) + scan_.rounding_speed(j, v[j]));
-      judge_pair<kSide>(key, d, d_end, u, v_start, v_last, distance, scan_.tolerance(sigma), tau, slack, end);
+      judge_pair(key, side, d, d_end, u, v_start, v_last, distance, scan_.tolerance(sigma), tau, slack, end);
     };
-    const auto step = [&]<int kSide>(const StepSurface& surface) {
-      const double distance = surface.distance(sigma), gap = kSide * (d_end.norm() - distance);
+    const auto step = [&](double side, const StepSurface& surface) {
+      const double distance = surface.distance(sigma), gap = d_end.norm() - distance;
       // On a tangent a pair is outside.
-      const double slack = kSide * approach_slack(sigma, v_end[i].norm(), v_end[j].norm());
+      const double slack = side * approach_slack(sigma, v_end[i].norm(), v_end[j].norm());
       const double rounding_last = rounding_at(x_end[i], x_end[j]);  // as the next piece computes it
-      judge_pair<kSide>(key, d, d_end, u, v_start, v_last, distance, std::min(rounding, rounding_last), tau, slack,
-                        end);
-      if (std::abs(gap) <= rounding_last && kSide * d_end.dot(v_last) < -slack)
-        arrivals_.push_back({key, &surface, kSide});
+      judge_pair(key, side, d, d_end, u, v_start, v_last, distance, std::min(rounding, rounding_last), tau, slack, end);
+      if (std::abs(gap) <= rounding_last && side * d_end.dot(v_last) < -slack)
+        arrivals_.push_back({key, &surface, side});
     };
     if (passed == 0)
-      hard.template operator()<1>(steps.core_distance(sigma));
+      hard(1, steps.core_distance(sigma));
     else
-      step.template operator()<1>(steps.surfaces[passed - 1]);
+      step(1, steps.surfaces[passed - 1]);
     if (passed == steps.surfaces.size()) return;
     if (const StepSurface& next = steps.surfaces[passed]; next.tether())
-      hard.template operator()<-1>(next.distance(sigma));
+      hard(-1, next.distance(sigma));
     else
-      step.template operator()<-1>(next);
+      step(-1, next);
   }
 
-  /// A pair and the distance `sigma`, which it meets from outside (kSide = 1) or from inside (−1).
-  template <int kSide>
-  void judge_pair(const EventKey<D>& key, const Vec<D>& d, const Vec<D>& d_end, const Vec<D>& u, const Vec<D>& v,
-                  const Vec<D>& v_end, double sigma, double tolerance, double tau, double slack,
+  /// A pair and the distance `sigma`, which it meets from outside (side = 1) or from inside (−1).
+  void judge_pair(const EventKey<D>& key, double side, const Vec<D>& d, const Vec<D>& d_end, const Vec<D>& u,
+                  const Vec<D>& v, const Vec<D>& v_end, double sigma, double tolerance, double tau, double slack,
                   PieceEnd<D>& end) const {
-    const double gap = kSide * (d.norm() - sigma), gap_end = kSide * (d_end.norm() - sigma);
+    const double gap = side * (d.norm() - sigma), gap_end = side * (d_end.norm() - sigma);
     if (gap > tolerance) {
-      const double c = kSide > 0 ? contact_time<D>(d, u, sigma, 0.0) : leaving_time<D>(PairMotion<D>{d, u}, sigma, 0.0);
+      const double c = side > 0 ? contact_time<D>(d, u, sigma, 0.0) : leaving_time<D>(PairMotion<D>{d, u}, sigma, 0.0);
       if (std::abs(gap_end) <= kClosed * tolerance)
         end.touches = true;
       else if (c < tau)
@@ -162,11 +160,11 @@ class ChordContacts {
       end.contact = std::min(end.contact, c);
       return;
     }
-    const double departing = kSide * 2 * d.dot(v), quotient = kSide * (2 * d.dot(u) + tau * u.squaredNorm());
-    const bool through = kSide > 0 && d.dot(u) < 0 && d.dot(d_end) < 0.5 * sigma * sigma;
+    const double departing = side * 2 * d.dot(v), quotient = side * (2 * d.dot(u) + tau * u.squaredNorm());
+    const bool through = side > 0 && d.dot(u) < 0 && d.dot(d_end) < 0.5 * sigma * sigma;
     if (gap_end < scan_.floor(gap, tolerance) || through)
       violate(key, end);
-    else if (gap_end <= tolerance && kSide * d_end.dot(v_end) < -slack)
+    else if (gap_end <= tolerance && side * d_end.dot(v_end) < -slack)
       end.touches = true;
     if (quotient < departing)
       end.contact = std::min(end.contact, std::max(0.0, departing) * tau / (departing - quotient));
@@ -177,14 +175,8 @@ class ChordContacts {
                         const Vec<D>& chord, const Vec<D>& v_end, double radius, double tau, PieceEnd<D>& end) const {
     const Vec<D> d = wall.from_centre(x), u = wall.across(chord);
     const double reach = wall.reach(radius), slack = reach * scan_.rounding_speed(key.lo, v);
-    const auto judge_from = [&]<int kSide>() {
-      judge_pair<kSide>(key, d, d + tau * u, u, wall.across(v), wall.across(v_end), reach, scan_.tolerance(radius), tau,
-                        slack, end);
-    };
-    if (wall.inside)
-      judge_from.template operator()<-1>();
-    else
-      judge_from.template operator()<1>();
+    judge_pair(key, wall.inside ? -1 : 1, d, d + tau * u, u, wall.across(v), wall.across(v_end), reach,
+               scan_.tolerance(radius), tau, slack, end);
   }
 
   void judge_wall(const EventKey<D>& key, double gap, double u, double v, double v_end, double radius, double tau,

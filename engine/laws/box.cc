@@ -82,7 +82,8 @@ void Box<D>::add(WallOptions<D> wall) {
     }
     for (int k = 0; k < D; ++k) {
       if (!periodic(k)) continue;
-      // What points out of a parallel wall: along the axis of the box, or of a cylinder, across it.
+      // `off` vanishes for a parallel wall: the normal's part along this axis, or the part of a cylinder's direction
+      // across.
       Vec<D>& vector = wall.round > 0 ? wall.direction : wall.normal;
       Vec<D> off = vector[k] * Vec<D>::Unit(k);
       if (wall.round > 0) off = vector - off;
