@@ -377,7 +377,8 @@ TEST(EventCore, ASphereAtRestOnAWallUnderAFieldIsAnErrorThatNamesIt) {
     FAIL() << "no error";
   } catch (const Error& error) {
     EXPECT_EQ(error.failure(), Failure::numerical);
-    EXPECT_NE(std::string(error.what()).find("particle 0 rests or slides on the lower wall of axis 1"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("particle 0 rests or slides on the lower wall of axis 1"),
+              std::string::npos);
   }
 }
 
