@@ -23,14 +23,15 @@ void StepAccount::check(const Steps& steps, double by_events, const std::string&
                                         ") " + when + "; use a smaller integrator.step");
 }
 
-template <int D>
-StepAccount own_steps(const System<D>& system, const Particles<D>& state, NeighbourList<D>* known) {
-  StepAccount own;
+namespace {
+
+/// Calls visit(lo, hi, steps outside of which they are) for the pairs of this rank that are inside of a step.
+template <int D, class Visit>
+void visit_pairs_inside(const System<D>& system, const Particles<D>& state, NeighbourList<D>* known, Visit&& visit) {
   const Box<D>& box = system.box;
-  if (box.steps.empty()) return own;
   const double rounding = box.gap_tolerance()(0);
   const bool epoch = box.step == 0;  // free flight
-  const auto count = [&](const Particles<D>& p, NeighbourList<D>& near) {
+  const auto look = [&](const Particles<D>& p, NeighbourList<D>& near) {
     for (const auto& [i, j, image] : near.cover(p.x)) {
       const PairSteps* const steps = box.steps.find(p.id_of(i), p.species[i], p.id_of(j), p.species[j]);
       if (!steps) continue;
@@ -39,25 +40,65 @@ StepAccount own_steps(const System<D>& system, const Particles<D>& state, Neighb
                                                  side_tolerance(false, epoch, sigma, rounding),
                                                  approach_slack(sigma, p.v[i].norm(), p.v[j].norm()));
       if (passed == steps->surfaces.size()) continue;
-      ++own.inside;
-      if (steps->surfaces.back().tether()) ++own.tethered;
-      for (std::size_t k = passed; k < steps->surfaces.size(); ++k)
-        if (const StepSurface& each = steps->surfaces[k]; !each.tether()) own.energy.add(-each.climb);
+      const auto [lo, hi] = std::minmax(p.id_of(i), p.id_of(j));
+      visit(lo, hi, std::span(steps->surfaces).subspan(passed));
     }
   };
   const Decomposition<D>& ranks = system.decomposition;
   if (ranks.joined() && !ranks.by_place()) {
     const auto halo = halo_of(box, 2 * box.steps.reach()(ranks.sizes().largest_radius()), ranks.ranks(), state);
     NeighbourList<D> near = pairs_within_reach(system, halo);
-    count(halo, near);
+    look(halo, near);
   } else if (known) {
-    count(state, *known);
+    look(state, *known);
   } else {
     NeighbourList<D> near = pairs_within_reach(system, state);
-    count(state, near);
+    look(state, near);
   }
+}
+
+}  // namespace
+
+template <int D>
+StepAccount own_steps(const System<D>& system, const Particles<D>& state, NeighbourList<D>* known) {
+  StepAccount own;
+  if (system.box.steps.empty()) return own;
+  visit_pairs_inside(system, state, known, [&](Id, Id, std::span<const StepSurface> around) {
+    ++own.inside;
+    if (around.back().tether()) ++own.tethered;
+    for (const StepSurface& each : around)
+      if (!each.tether()) own.energy.add(-each.climb);
+  });
   return own;
 }
+
+template <int D>
+std::vector<double> step_energies(const System<D>& system, const Particles<D>& state) {
+  struct PairEnergy {
+    Id lo, hi;
+    double energy;
+    auto operator<=>(const PairEnergy&) const = default;
+  };
+  if (system.box.steps.empty()) return {};
+  std::vector<PairEnergy> pairs;
+  visit_pairs_inside<D>(system, state, nullptr, [&](Id lo, Id hi, std::span<const StepSurface> around) {
+    double energy = 0;
+    for (const StepSurface& each : around) energy -= each.tether() ? 0 : each.climb;
+    pairs.push_back({lo, hi, energy});
+  });
+  if (Communicator* const ranks = system.decomposition.others()) {
+    pairs = gather_values<PairEnergy>(*ranks, pairs);
+    if (ranks->rank() > 0) return {};
+  }
+  std::ranges::sort(pairs);
+  std::vector<double> energies(system.size());
+  for (const PairEnergy& each : pairs)
+    for (const Id i : {each.lo, each.hi}) energies[i] += 0.5 * each.energy;
+  return energies;
+}
+
+template std::vector<double> step_energies(const System<2>&, const Particles<2>&);
+template std::vector<double> step_energies(const System<3>&, const Particles<3>&);
 
 template StepAccount own_steps(const System<2>&, const Particles<2>&, NeighbourList<2>*);
 template StepAccount own_steps(const System<3>&, const Particles<3>&, NeighbourList<3>*);

@@ -31,6 +31,11 @@ struct StepAccount {
 template <int D>
 StepAccount own_steps(const System<D>& system, const Particles<D>& state, NeighbourList<D>* near = nullptr);
 
+/// The energy of the steps of each particle: half of that of each of its pairs, by id, on the first rank; empty on
+/// others, and without steps. The bits are the same on any number of ranks. Collective if pairs have steps.
+template <int D>
+std::vector<double> step_energies(const System<D>& system, const Particles<D>& state);
+
 /// The pairs to which something may happen before the next list.
 template <int D>
 NeighbourList<D> pairs_within_reach(const System<D>& system, const Particles<D>& state) {

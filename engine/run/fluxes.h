@@ -4,8 +4,9 @@
 //
 //   S = Σ m v v + Σ d F + Σ d J δ(t − t_c),   Q = Σ e v + ½ Σ d F·(v_i + v_j) + Σ d ΔE δ(t − t_c),
 //
-// with e = ½ m v² + ½ Σ V, sums over particles, over pairs (d = x_i − x_j of each image within the cutoff, F the force
-// on i) and over collisions (J the impulse on i, ΔE the energy that i gets, d of the image that is touched).
+// with e = ½ m v² + ½ Σ V (the energy of steps included), sums over particles, over pairs (d = x_i − x_j of each image
+// within the cutoff, F the force on i) and over collisions (J the impulse on i, ΔE the energy that i gets, d of the
+// image that is touched).
 //
 // The integrals over time are sums of what passes during each interval. They are not differences of Σ m x v_y and
 // Σ e x, which are no functions of the state in a periodic box (Erpenbeck, Phys. Rev. E 51 (1995) 4296). Σ m v v and
@@ -88,6 +89,7 @@ class FluxIntegral {
 
   void add(double slab_start, std::span<const Contact<D>> contacts) {
     if (mass_.empty()) return;  // before the first sample, or not on rank 0
+    const bool steps = !of_steps_.empty();
     for (const Contact<D>& each : contacts) {
       const bool pair = each.key.kind == EventKind::pair;
       Fluxes<D> jump;
@@ -96,6 +98,11 @@ class FluxIntegral {
         const Vec<D> after = v - drift_, before = after - impulse / mass_[i];
         jump.add_kinetic(mass_[i], after);
         jump.add_kinetic(mass_[i], before, -1);
+        if (steps) {
+          jump.heat -= of_steps_[i] * before;
+          of_steps_[i] += 0.5 * each.exchange.stored;
+          jump.heat += of_steps_[i] * after;
+        }
         return 0.5 * impulse.dot(before + after);
       };
       const double gained = bounced(each.key.lo, each.v_lo, each.impulse);
@@ -112,6 +119,9 @@ class FluxIntegral {
     }
   }
 
+  /// Makes the energy of steps part of the heat flux: step_energies() at the first sample, before to().
+  void add_steps(std::vector<double> energies) { of_steps_ = std::move(energies); }
+
   /// The integrals over the time since the last sample; zero at the first one, and on other ranks than the first.
   /// Collective.
   Fluxes<D> to(double time, const Particles<D>& particles, std::span<const Traveller<D>> all) {
@@ -127,7 +137,10 @@ class FluxIntegral {
       drift_ = relative_ ? Vec<D>(drift_ / mass) : Vec<D>(Vec<D>::Zero());
     }
     Fluxes<D> now;
-    for (const Traveller<D>& each : all) now.add_kinetic(each.mass, each.v - drift_);
+    for (const Traveller<D>& each : all) {
+      now.add_kinetic(each.mass, each.v - drift_);
+      if (!of_steps_.empty()) now.heat += of_steps_[each.id] * (each.v - drift_);
+    }
     add_forces(particles, now);
     const double h = time - time_;
     Fluxes<D> sum;
@@ -147,7 +160,10 @@ class FluxIntegral {
   }
   const Vec<D>& drift() const { return drift_; }
 
-  void archive(Archive& archive) { archive(mass_, time_, last_, jumps_, moments_, drift_, transferred_); }
+  void archive(Archive& archive) {
+    archive(mass_, time_, last_, jumps_, moments_, drift_, transferred_);
+    if (!system_.box.steps.empty()) archive(of_steps_);
+  }
 
  private:
   void add_forces(const Particles<D>& particles, Fluxes<D>& now) {
@@ -169,10 +185,11 @@ class FluxIntegral {
 
   const System<D>& system_;
   bool relative_;
-  std::vector<double> mass_;   // by id; 0: fixed
-  double time_ = 0;            // of the last sample
-  Fluxes<D> last_;             // then
-  Fluxes<D> jumps_, moments_;  // Σ of the jumps since then, Σ of the jumps times the times since then
+  std::vector<double> mass_;      // by id; 0: fixed
+  std::vector<double> of_steps_;  // by id: the energy of its steps; empty without add_steps()
+  double time_ = 0;               // of the last sample
+  Fluxes<D> last_;                // then
+  Fluxes<D> jumps_, moments_;     // Σ of the jumps since then, Σ of the jumps times the times since then
   Vec<D> drift_ = Vec<D>::Zero(), transferred_ = Vec<D>::Zero();
 };
 

@@ -12,6 +12,7 @@
 // so their differences are exact at all lags. A running coefficient is the rate between half a lag and the lag: its
 // deviation decays as the correlations do, whereas the deviation of ⟨(∫S dt)²⟩/2t decays as 1/t.
 
+#include "engine/ranks/step_account.h"
 #include "engine/run/fluxes.h"
 
 namespace carom::observable {
@@ -101,8 +102,7 @@ class Transport : public Observable<D> {
   static constexpr std::size_t kStresses = D * (D + 1) / 2 - 1, kIntegrals = kStresses + D + D;
 
   std::size_t quantities() const { return kSingle + 2 * (number_.size() > 1 ? number_.size() + 1 : 1); }
-  // The energy that a step gives to each partner is not in the heat flux (fluxes.h).
-  bool conducts() const { return number_.size() == 1 && alike_ && system_.box.steps.empty(); }
+  bool conducts() const { return number_.size() == 1 && alike_; }
   double temperature() const { return temperatures_ / static_cast<double>(this->samples()); }
   double viscosity_scale() const { return 1 / (system_.box.volume() * temperature()); }
   static std::size_t first_lag(std::size_t level) { return level == 0 ? 0 : kLags / 2 + 1; }
@@ -129,6 +129,7 @@ class Transport : public Observable<D> {
                   "transport needs a conserved momentum, and fixed particles take it; set "
                   "transport_interval = 0");
     const std::vector<Traveller<D>> all = travellers(system_, particles);
+    if (this->samples() == 0) fluxes_.add_steps(step_energies(system_, particles));
     const Fluxes<D> sum = fluxes_.to(time, particles, all);
     if (all.empty()) return;
     if (this->samples() == 0) {
@@ -279,7 +280,7 @@ ObservableInfo transport() {
           "thermal_conductivity and electrical_conductivity (half the rate at which mean squared displacements and "
           "integrals of the fluxes of momentum, energy and charge grow between half the lag and the lag, divided by "
           "D, V T, V T^2 and V T), error_ and samples_ of each. With several species vacf and diffusion of each; "
-          "thermal_conductivity for one species of equal masses and equal or opposite charges without steps; "
+          "thermal_conductivity for one species of equal masses and equal or opposite charges; "
           "electrical_conductivity if there are charges. T is that of N - 1 particles, and the drift of the whole "
           "system is taken off. Memory: 34 "
           "positions or velocities of each particle for each doubling of the lag from 16 intervals on, on rank 0.",

@@ -52,7 +52,7 @@ PairSteps steps_of(const Parameters& given, bool listed) {
     for (const char* key : {"tether", "core"})
       if (given.has(key))
         refuse(std::string("'") + key + "' joins listed pairs, and 'between' names species",
-               "give 'pairs' or 'chain' instead of 'between'");
+               "give 'pairs', 'chain' or 'within' instead of 'between'");
   if (steps.surfaces.empty() && !(steps.core > 0))
     refuse("a step has neither 'range' nor 'tether' nor 'core'", "give a range and a depth, or a tether");
   return steps;
@@ -68,6 +68,8 @@ const std::vector<Parameter>& step_parameters() {
       {"pairs", pair_list, "none", "-", "instead: the pairs of particles, by number from 0, that are bonded by them"},
       {"chain", boolean, "false", "-", "instead: bond each particle to the next"},
       {"chain_length", integer, "none", "-", "particles in each chain, in id order; absent: a single chain of all",
+       Range::positive},
+      {"within", real, "none", "length", "instead: bond the pairs that are at most this far apart in the initial state",
        Range::positive},
       {"range", real_or_list, "none", "unit",
        "the distance of a step, or an ascending list; a bond has the steps of its list and not those of its species",
@@ -90,10 +92,10 @@ const std::vector<Parameter>& step_parameters() {
 
 template <int D>
 void add_step(Box<D>& box, std::span<const std::string> species, std::size_t particles, const Parameters& given) {
-  const bool listed = given.has("pairs") || given.flag("chain");
+  const bool listed = given.has("pairs") || given.flag("chain") || given.has("within");
   if (listed == given.has("between"))
     refuse(listed ? "'between' and a list of pairs exclude each other" : "a step names no pairs",
-           "give 'between', 'pairs' or 'chain'");
+           "give 'between', 'pairs', 'chain' or 'within'");
   const PairSteps steps = steps_of(given, listed);
   if (box.steps.empty()) box.steps.resize(species.size());
   if (listed) {
@@ -122,7 +124,17 @@ void add_step(Box<D>& box, std::span<const std::string> species, std::size_t par
     for (const std::size_t other : partners[1]) box.steps.set_pair(one, other, list);
 }
 
+template <int D>
+void find_step_bonds(Parameters& given, const InteractionContext<D>& context) {
+  if (!given.has("within")) return;
+  const PairList bonds = options::bonds("step", given, context);
+  given.erase("within");
+  given.set("pairs", bonds);
+}
+
 template void add_step(Box<2>&, std::span<const std::string>, std::size_t, const Parameters&);
 template void add_step(Box<3>&, std::span<const std::string>, std::size_t, const Parameters&);
+template void find_step_bonds(Parameters&, const InteractionContext<2>&);
+template void find_step_bonds(Parameters&, const InteractionContext<3>&);
 
 }  // namespace carom

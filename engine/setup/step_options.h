@@ -7,15 +7,21 @@
 
 #include "engine/base/parameters.h"
 #include "engine/laws/box.h"
+#include "engine/laws/interaction.h"
 
 namespace carom {
 
 const std::vector<Parameter>& step_parameters();
 
-/// Gives pairs these steps: all pairs of two species, or listed pairs of a system with this many particles. These
-/// parameters are complete. Steps of two species replace earlier ones of these two. Throws Error(Failure::deck), also
+/// Gives pairs these steps: all pairs of two species, or listed pairs of a system with this many particles; none for
+/// `within`, until find_step_bonds() has listed them. These parameters are complete. Steps of two species replace earlier ones of these two. Throws Error(Failure::deck), also
 /// if a pair is bonded twice.
 template <int D>
 void add_step(Box<D>& box, std::span<const std::string> species, std::size_t particles, const Parameters& given);
+
+/// Replaces `within` by the `pairs` that are this near in the positions of the context. Throws Error(Failure::deck) if
+/// there are none.
+template <int D>
+void find_step_bonds(Parameters& given, const InteractionContext<D>& context);
 
 }  // namespace carom

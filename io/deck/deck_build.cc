@@ -140,6 +140,30 @@ void take_bonds(Deck::Source& source, const std::vector<PairList>& bonds) {
     }
 }
 
+template <int D>
+InteractionContext<D> context_of(const Deck::Source& source, const System<D>& system, bool placed) {
+  return {.box = system.box,
+          .particles = system.particles,
+          .species = system.species,
+          .placed = placed,
+          .total = source.particles(),
+          .ranks = system.decomposition.others()};
+}
+
+/// Adds the steps of pairs that are near each other in the initial state; the resolved deck lists these pairs.
+template <int D>
+void bond_near(Deck::Source& source, System<D>& system, Problems& problems) {
+  for (ValueTable& step : source.values.list("step")) {
+    if (!step.values.has("within")) continue;
+    try {
+      find_step_bonds<D>(step.values, context_of(source, system, true));
+      add_step<D>(system.box, system.species, source.particles(), step.values);
+    } catch (const Error& e) {
+      problems.error(step.at, e.what());
+    }
+  }
+}
+
 }  // namespace
 
 bool built_in_blocks(const Deck::Source& source) {
@@ -169,12 +193,7 @@ void fill_box(const Deck::Source& source, System<D>& system) {
 
 template <int D>
 void make_interactions(const Deck::Source& source, System<D>& system, bool placed, Problems& problems) {
-  InteractionContext<D> context{.box = system.box,
-                                .particles = system.particles,
-                                .species = system.species,
-                                .placed = placed,
-                                .total = source.particles(),
-                                .ranks = system.decomposition.others()};
+  InteractionContext<D> context = context_of(source, system, placed);
   const auto bonded = [](const InteractionConfig& config) {
     return config.info->kind == InteractionInfo::Kind::bonded;
   };
@@ -240,6 +259,7 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const G
   }
 
   Problems problems;
+  bond_near(*deck.source, *system, problems);
   make_interactions(source, *system, true, problems);
   problems.throw_errors(Failure::deck);
   if (given && !given->branch) return system;

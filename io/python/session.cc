@@ -354,8 +354,9 @@ void Session<D>::add_step(Parameters given) {
   if (size_ == 0) refuse("step: there are no particles yet; call add_particles() first");
   auto all = values_.list("step");
   all.push_back(table_of("step", std::move(given)));
-  set_pair_steps(std::move(all));
   change("add steps");
+  find_step_bonds<D>(all.back().values, {.box = box_, .particles = system_->particles, .species = species_});
+  set_pair_steps(std::move(all));
 }
 
 /// Sets these steps for the present species and particles.

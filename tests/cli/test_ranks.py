@@ -10,6 +10,8 @@ import subprocess
 import sys
 import tomllib
 
+import h5py
+import numpy as np
 import pytest
 
 from going_on import go_on
@@ -167,6 +169,23 @@ def test_steps_that_hold_chains_on_ranks_and_after_a_kill(method, killer, tmp_pa
     expect_same_anywhere(deck, output, plain, killer, (2, 3))
 
 
+def test_tethers_between_the_neighbours_in_a_lattice(killer, tmp_path):
+    tied = tomllib.loads(DISCS) | {
+        "title": "tethered discs", "interaction": [], "system": {"dimension": 2, "boundary": ["periodic", "periodic"]},
+        "particles": [{"name": "disc", "count": 144, "temperature": 1.0, "radius": 0.4}],
+        "placement": {"type": "square", "packing_fraction": 0.3, "seed": 2}, "step": [{"within": 1.4, "tether": 1.7}]}
+    deck, plain = write_deck(tmp_path, toml_text(tied)), tmp_path / "plain"
+    output = ["output.events=true", "output.checkpoint_wall=\"0\"", "run.end_time=3.0", "integrator.type=free-flight", "integrator.step=0.25"]
+    run(deck, plain, output)
+    assert summary(plain)["events"]["bounced"] > 500
+    with h5py.File(plain / "trajectory.h5") as file:
+        bonds = file["connectivity/bonds"][:]
+    assert len(bonds) == 2 * 144 and np.array_equal(np.bincount(bonds.ravel()), np.full(144, 4))  # the four neighbours of each disc
+    expect_same_anywhere(deck, output, plain, killer, (2, 3))
+    again = subprocess.run([CAROM, "branch", plain, "-o", tmp_path / "branch", "--set", "step.0.within=1.3"], capture_output=True, text=True)
+    assert again.returncode == 2 and "bonds are given twice" in again.stderr
+
+
 def test_a_number_of_collisions_next_to_steps(tmp_path):
     """Events at steps do not count as collisions."""
     deck = write_deck(tmp_path, toml_text({key: value for key, value in STEPS.items() if key != "step"} |
@@ -283,27 +302,31 @@ def test_the_fluxes_of_an_ewald_sum_are_shared(tmp_path):
             assert filecmp.cmp(tmp_path / "plain" / name, tmp_path / str(ranks) / name, shallow=False)
 
 
-@pytest.mark.parametrize("method", ["free-flight", "edda"])
-def test_an_equilibrated_run_on_ranks_and_after_a_kill(method, killer, tmp_path):
-    deck = ROOT / "inputs" / ("yukawa-fluid.toml" if method == "edda" else "hard-sphere-fluid.toml")
+@pytest.mark.parametrize("fluid", ["hard-sphere-fluid", "yukawa-fluid", "square-well"])
+def test_an_equilibrated_run_on_ranks_and_after_a_kill(fluid, killer, tmp_path):
+    tables = tomllib.loads((ROOT / "inputs" / f"{fluid}.toml").read_text())
+    tables.pop("bath", None)
+    deck = write_deck(tmp_path, toml_text(tables))
     plain, killed = tmp_path / "plain", tmp_path / "killed"
     output = ["particles.0.count=108", "output.start=\"equilibrated\"", "output.frame_interval=0",
               "output.rdf_interval=0.1", "output.sk_interval=0.2", "output.sk_bins=5", "output.checkpoint_wall=\"0\"",
               "output.transport_interval=0.08", "output.pressure_tensor_interval=0.05",
-              *(["integrator.step=0.03", "run.end_time=5.6", "output.thermo_interval=0.04", "interaction.0.cutoff=2.0"] if method == "edda"
+              *(["integrator.step=0.03", "run.end_time=5.6", "output.thermo_interval=0.04", "interaction.0.cutoff=2.0"] if fluid == "yukawa-fluid"
                 else ["integrator.step=0.2", "output.thermo_interval=0.03", "run.end_time=6"])]
     run(deck, plain, output)
     found = summary(plain)["equilibration"]
     assert 0 < found["transient_end"] <= found["start"] / 2 + 0.25 and 3 <= found["start"] < 5.5
     assert summary(plain)["means"]["pressure"]["standard_error"] > 0
     assert summary(plain)["transport"]["shear_viscosity"]["mean"] > 0
-    mpirun(2, command(deck, tmp_path / "two", output))
+    mpirun(2, command("input.toml", tmp_path / "two", output), cwd=tmp_path)
     assert differences(plain, tmp_path / "two") == []
+    assert filecmp.cmp(plain / "transport.csv", tmp_path / "two" / "transport.csv", shallow=False)
     for part in 0.2, 0.7:  # before and after the end of the transient
         row = int(part * len(thermo(plain)["time"]))
         run(deck, killed, output, env=signalled(killer, killed, signal.SIGKILL, row), code=-signal.SIGKILL)
-        go_on(killed, ranks=2 if method == "free-flight" else 1)
+        go_on(killed, ranks=1 if fluid == "yukawa-fluid" else 2)
         assert differences(plain, killed) == []
+        assert filecmp.cmp(plain / "transport.csv", killed / "transport.csv", shallow=False)
 
 
 @pytest.mark.parametrize("method", ["psa", "edda"])

@@ -71,6 +71,7 @@ DECKS = [
     deck(step=[{"between": ["*", "*"], "range": [1.2, 1.5], "depth": [1.0, 0.5], "unit": "contact"}]),
     deck(step=[{"pairs": [[0, 1]], "range": 3.0, "depth": 0.1, "unit": "length", "tether": 9.0, "core": 0.9}]),
     deck(step=[{"chain": True, "chain_length": 2, "tether": 9.0}]),
+    deck(step=[{"within": 2.5, "tether": 9.0}]),
     placed("fcc", 3, packing_fraction=0.3), placed("simple-cubic", 3, seed=4), placed("hexagonal", packing_fraction=0.3),
     placed("square", seed=2), placed("compressed", growth_rate=0.2, max_collisions=5000.0), placed("file", file="places.txt"),
     deck(system=FLAT | {"boundary": ["periodic", "periodic"]}, integrator={"type": "verlet", "step": 0.01},

@@ -291,14 +291,15 @@ class Simulation:
         self._session.set("contact", given | {"between": [name_of("add_contact", one), name_of("add_contact", other)]})
 
     def add_step(self, *between, **parameters):
-        """Makes the energy of pairs jump at distances: wells and shoulders between two species ("*" stands for all), or, by `pairs` or
-        `chain`, bonds between listed particles.
+        """Makes the energy of pairs jump at distances: wells and shoulders between two species ("*" stands for all), or, by `pairs`,
+        `chain` or `within`, bonds between listed particles.
 
         Parameters are those of [[step]] in decks, which carom.describe("step") lists.
 
             sim.add_step("*", "*", range=1.5, depth=1.0)                      # a square well of 1.5 diameters
             sim.add_step("*", "*", range=[1.2, 1.5], depth=[1.0, 0.5])        # two steps
             sim.add_step(pairs=[[0, 1], [1, 2]], tether=1.1, core=0.9)        # hard bonds
+            sim.add_step(within=1.1, tether=1.3)                              # tethers between present neighbours
         """
         given = refuse_masked("add_step", dict(parameters))
         if between:

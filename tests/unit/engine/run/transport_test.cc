@@ -9,6 +9,7 @@
 
 #include "engine/base/error.h"
 #include "engine/run/observable.h"
+#include "engine/setup/step_options.h"
 #include "tests/support/experiments.h"
 
 namespace carom::transport_test {
@@ -163,10 +164,14 @@ TEST(Transport, OfStraightFlights) {
   }
 }
 
-/// Σ m x v and Σ e x at the times of the samples, e with half the energy of each bond of a chain.
+/// The energy of a pair with a shoulder in a well.
+constexpr double kShoulder = 1.2, kWell = 1.5;
+double energy_of_steps(double distance) { return distance < kShoulder ? 0.4 : distance < kWell ? -1 : 0; }
+
+/// Σ m x v and Σ e x at the times of the samples, e with half the energy of each bond of a chain and of steps.
 template <int D>
 struct Moments : Observer<D> {
-  Moments(double interval, double stiffness) : interval_(interval), stiffness_(stiffness) {}
+  Moments(double interval, double stiffness, bool steps) : interval_(interval), stiffness_(stiffness), steps_(steps) {}
   Sampling sampling() const override { return {interval_, 0}; }
   void sample(double /*time*/, const Particles<D>& p) override {
     std::vector<double> all;
@@ -174,6 +179,8 @@ struct Moments : Observer<D> {
     Vec<D> heat = Vec<D>::Zero();
     for (Id i = 0; i < p.size(); ++i) {
       double energy = 0.5 * p.v[i].squaredNorm();
+      for (Id j = 0; steps_ && j < p.size(); ++j)
+        if (i != j) energy += 0.5 * energy_of_steps((p.x[i] - p.x[j]).norm());
       for (Id j = 0; j < p.size(); ++j)
         if (i == j + 1 || j == i + 1) energy += 0.25 * stiffness_ * std::pow((p.x[i] - p.x[j]).norm() - 1, 2);
       stress += p.x[i] * p.v[i].transpose();
@@ -199,6 +206,7 @@ struct Moments : Observer<D> {
 
  private:
   double interval_, stiffness_;
+  bool steps_;
 };
 
 /// Runs a cluster that no particle leaves and that no pair joins across the boundary: there Σ m x v and Σ e x are
@@ -206,7 +214,7 @@ struct Moments : Observer<D> {
 /// and conductivity at the longest lag, which has one origin.
 template <int D>
 std::array<double, 2> errors_in_cluster(const std::string& integrator, std::size_t samples, double stiffness,
-                                        double radius = 0.5) {
+                                        double radius = 0.5, bool steps = false) {
   const double end = stiffness > 0 ? 0.4 : 1.6, interval = end / static_cast<double>(samples);
   auto system = test::hard_spheres<D>(2, 0.3, 5);
   Particles<D>& p = system->particles;
@@ -219,13 +227,20 @@ std::array<double, 2> errors_in_cluster(const std::string& integrator, std::size
   for (auto& v : p.v) v -= drift;
   if (stiffness > 0)
     test::add_interaction(*system, "harmonic-bond", {{"chain", true}, {"stiffness", stiffness}, {"rest_length", 1.0}});
+  if (steps)
+    add_step<D>(system->box, system->species, system->size(),
+                completed("step", step_parameters(),
+                          {{"between", std::vector<std::string>{"*", "*"}},
+                           {"range", std::vector{kShoulder, kWell}},
+                           {"depth", std::vector{-0.4, 1.0}}}));
   auto run = test::make_run<D>(std::move(system), integrator, {.step = 0.00625, .end_time = end});
   const auto transport = make_observable("transport", run->system(), {{"interval", interval}, {"longest", end}});
-  Moments<D> moments(interval, stiffness);
+  Moments<D> moments(interval, stiffness, steps);
   run->add(*transport);
   run->add(moments);
   run->run();
   EXPECT_EQ(run->statistics().counters.sphere_sphere > 5, radius == 0.5);
+  EXPECT_EQ(run->statistics().counters.steps.entered > 5, steps);
   EXPECT_EQ(moments.moments.size(), samples + 1);
   const auto t = columns(*transport);
   EXPECT_EQ(t.at("time").size(), samples + 1);
@@ -246,6 +261,8 @@ void expect_moments_of_state() {
   for (const std::size_t samples : {1, 2, 7, 16})
     for (const double each : errors_in_cluster<D>("free-flight", samples, 0)) EXPECT_NEAR(each, 0, 1e-9) << samples;
   for (const double each : errors_in_cluster<D>("edda", 16, 0)) EXPECT_NEAR(each, 0, 1e-9);
+  for (const char* integrator : {"free-flight", "edda"})
+    for (const double each : errors_in_cluster<D>(integrator, 7, 0, 0.5, true)) EXPECT_NEAR(each, 0, 1e-9);
   // With forces, the trapezoidal rule.
   const auto coarse = errors_in_cluster<D>("edda", 8, 5, 1e-3), fine = errors_in_cluster<D>("edda", 16, 5, 1e-3);
   for (const std::size_t k : {0, 1}) {
