@@ -380,8 +380,9 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     double pressing = 0;  // Σ |F| |x| of reactions
     double stopped = 0;   // energy that held contacts have dissipated
     if (resting()) {      // then every rank has all particles
-      const bool slow = core_->scan().held_slowly(x, v_end_, h);
-      const double lost = core_->scan().slide(x, v_end_, h);
+      const auto hit = [&](Id i) { return core_->collides(i); };
+      const bool slow = core_->scan().held_slowly(x, v_end_, h, hit);
+      const double lost = core_->scan().slide(x, v_end_, h, hit);
       if (slow && lost > 0) stopped = lost;
       if (system.decomposition.ranks().rank() == 0) {
         missing_here.add(lost - stopped);

@@ -40,7 +40,7 @@ void visit_pairs_inside(const System<D>& system, const Particles<D>& state, Neig
                                                  side_tolerance(false, epoch, sigma, rounding),
                                                  approach_slack(sigma, p.v[i].norm(), p.v[j].norm()));
       if (passed == steps->surfaces.size()) continue;
-      const auto [lo, hi] = std::minmax(p.id_of(i), p.id_of(j));
+      const auto [lo, hi] = std::minmax({p.id_of(i), p.id_of(j)});
       visit(lo, hi, std::span(steps->surfaces).subspan(passed));
     }
   };

@@ -465,10 +465,11 @@ void ContactScan<D>::remember(double length) {
 }
 
 template <int D>
-double ContactScan<D>::slide(Positions<D> x, Vectors<D> v, double later) {
+double ContactScan<D>::slide(Positions<D> x, Vectors<D> v, double later, const std::function<bool(Id)>& hit) {
   std::vector<RestingContact<D>> held;
   for (const auto& contact : resting_)
-    if (contact.force > 0) held.push_back({.key = contact.key, .normal = normal(contact.key, x)});
+    if (contact.force > 0 && !was_hit(contact.key, hit))
+      held.push_back({.key = contact.key, .normal = normal(contact.key, x)});
   for (auto& contact : held) {
     contact.slack = normal_slack(contact, v);
     contact.bound = wall_speed(contact.key, later);
@@ -477,9 +478,10 @@ double ContactScan<D>::slide(Positions<D> x, Vectors<D> v, double later) {
 }
 
 template <int D>
-bool ContactScan<D>::held_slowly(Positions<D> x, Positions<D> v, double later) const {
+bool ContactScan<D>::held_slowly(Positions<D> x, Positions<D> v, double later,
+                                 const std::function<bool(Id)>& hit) const {
   return std::ranges::all_of(resting_, [&](const RestingContact<D>& contact) {
-    if (contact.force == 0) return true;
+    if (contact.force == 0 || was_hit(contact.key, hit)) return true;
     const EventKey<D>& key = contact.key;
     const Touch<D> touch{.key = key, .normal = normal(key, x), .speed = wall_speed(key, later)};
     return std::abs(normal_speed(touch, v)) <= std::max(rounding_speed(key, v), rest_.rest_speed(key, touch.normal));

@@ -94,11 +94,12 @@ class ContactScan {
 
   /// Makes the velocities of contacts that were held over a piece tangential at its end, x, and conserves their energy
   /// (the normal velocity that a held piece of finite length leaves would make the pair bounce at once). Returns the
-  /// energy that is missing afterwards. The piece ends `later` after the present time of the box.
-  double slide(Positions<D> x, Vectors<D> v, double later = 0);
+  /// energy that is missing afterwards. The piece ends `later` after the present time of the box. Contacts of spheres
+  /// that have got an impulse at its end keep their velocities.
+  double slide(Positions<D> x, Vectors<D> v, double later = 0, const std::function<bool(Id)>& hit = {});
   /// Whether all held contacts approach or open more slowly than their rest speeds, so that slide() ends slow motion
   /// and does not turn a fast pair.
-  bool held_slowly(Positions<D> x, Positions<D> v, double later = 0) const;
+  bool held_slowly(Positions<D> x, Positions<D> v, double later, const std::function<bool(Id)>& hit) const;
 
   /// The candidate pairs, for methods that search for contacts themselves.
   NeighbourList<D>& list() { return list_; }
@@ -176,6 +177,10 @@ class ContactScan {
   double count_push(const RestingContact<D>& contact, double impulse, double speed);
   double stop_rounding(Vectors<D> v) const;
   Vec<D> normal(const EventKey<D>& key, Positions<D> x) const { return contact_normal<D>(box_, particles_, key, x); }
+  /// Whether one of the partners has got an impulse.
+  static bool was_hit(const EventKey<D>& key, const std::function<bool(Id)>& hit) {
+    return hit && (hit(key.lo) || (key.kind == EventKind::pair && hit(key.hi)));
+  }
   double least_opening(const RestingContact<D>& contact, Positions<D> v, Positions<D> a, double time_left) const;
   double least_pull(const RestingContact<D>& contact, Positions<D> x, Positions<D> v) const;
   double normal_slack(const RestingContact<D>& contact, Positions<D> v) const;

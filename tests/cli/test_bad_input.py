@@ -201,7 +201,7 @@ DECK_ERRORS = {
         stepped('between = ["*", "*"]\nrange = 1.5\ndepth = inf'), 12, ["'depth'", "finite"]),
     "step of an unknown species": (
         stepped('between = ["*", "ion"]\nrange = 1.5\ndepth = 1.0'), 9, ["'ion' is no species", "give one of"]),
-    "tether between species": (stepped('between = ["*", "*"]\ntether = 1.5'), 9, ["'tether' joins listed pairs", "'pairs' or 'chain'"]),
+    "tether between species": (stepped('between = ["*", "*"]\ntether = 1.5'), 9, ["'tether' joins listed pairs", "'pairs', 'chain' or 'within'"]),
     "steps next to a law of contacts": (
         stepped('between = ["*", "*"]\nrange = 1.5\ndepth = 1.0\n[[contact]]\nbetween = ["*", "*"]\nrestitution = 0.9'),
         9, ["come to rest at the ranges", "take free-flight"]),

@@ -178,7 +178,7 @@ def test_tethers_between_the_neighbours_in_a_lattice(killer, tmp_path):
     output = ["output.events=true", "output.checkpoint_wall=\"0\"", "run.end_time=3.0", "integrator.type=free-flight", "integrator.step=0.25"]
     run(deck, plain, output)
     assert summary(plain)["events"]["bounced"] > 500
-    with h5py.File(plain / "trajectory.h5") as file:
+    with h5py.File(plain / "trajectory.h5md") as file:
         bonds = file["connectivity/bonds"][:]
     assert len(bonds) == 2 * 144 and np.array_equal(np.bincount(bonds.ravel()), np.full(144, 4))  # the four neighbours of each disc
     expect_same_anywhere(deck, output, plain, killer, (2, 3))

@@ -218,6 +218,23 @@ TEST(Steps, ATautChainStaysAtRest) {
     }
 }
 
+/// A disc that flies up bounces on the shoulder of a weight on a taut tether, and the weight flies on in its place.
+TEST(Steps, AShoulderThrowsAWeightOffItsTautTether) {
+  for (const std::string method : {"edda", "cdda"}) {
+    auto system =
+        test::make_system<2>({20, 41}, Boundary::open, {{10, 40}, {10, 38.8}, {10, 37}}, {{0, 0}, {0, 0}, {0, 1}});
+    system->particles.mass[0] = std::numeric_limits<double>::infinity();
+    add(*system, {{"pairs", PairList{{0, 1}}}, {"tether", 1.2}});
+    add(*system, {{"pairs", PairList{{1, 2}}}, {"range", 1.5}, {"depth", -9.0}});
+    add_interaction(*system, "uniform-field", {{"acceleration", std::vector<double>{0, -1}}});
+    const auto run = test::run_until<2>(std::move(system), method, 0.01, 0.7);
+    const double speed = std::sqrt(1 - 2 * 0.3), after = 0.7 - (1 - speed);  // from 37 to 38.8 − 1.5
+    EXPECT_NEAR(run->system().particles.x[1][1], 38.8 + after * (speed - 0.5 * after), 1e-11) << method;
+    EXPECT_NEAR(run->system().particles.x[2][1], 37.3 - 0.5 * after * after, 1e-11) << method;
+    EXPECT_LT(run->statistics().max_energy_error, 1e-13 * run->statistics().energy_reference) << method;
+  }
+}
+
 /// The bounces of a pair that turns on an inelastic tether end: then it turns on a circle with its angular momentum.
 TEST(Steps, AnInelasticTetherEndsInACircle) {
   for (const std::string method : {"edda", "cdda", "psa"}) {
