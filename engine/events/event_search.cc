@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "engine/events/event_search.h"
 
+#include <bit>
+
 #include "engine/events/surroundings.h"
 
 namespace carom {
@@ -147,16 +149,40 @@ void EventSearch<D>::scan(const ScanTask& task, bool latest) {
   plan_first(task, flights_.has_steps() ? ScanResult{} : kernels_.scan[D - 2](setting_, task, latest));
 }
 
+/// Plans the first contact with the candidates, or the first step that a pair reaches, if it is earlier than the
+/// planned one.
+template <int D>
+void EventSearch<D>::offer_steps(const ScanTask& task) {
+  if (!setting_.surfaces) return offer_all(task);
+  for (unsigned start = 0; start < task.n; start += kScanBlock) {
+    const unsigned n = std::min(task.n - start, kScanBlock);
+    const ScanTask block{task.self, task.candidates + start, n, std::min(task.same - std::min(task.same, start), n)};
+    const StepScan found = kernels_.scan_steps[D - 2](setting_, block);
+    for (std::uint64_t near = found.near; near != 0; near &= near - 1)
+      offer(block, static_cast<unsigned>(std::countr_zero(near)));
+    const auto& [time, which, tied] = found.first;
+    if (time == kNever) continue;
+    if (tied) [[unlikely]]
+      offer_all(block);
+    else
+      queue_.offer(task.self, time, EventKind::pair, block.candidates[which]);
+  }
+}
+
+/// Plans the contact with a candidate if it is earlier than the planned one.
+template <int D>
+void EventSearch<D>::offer(const ScanTask& task, unsigned q) {
+  const std::uint32_t candidate = task.candidates[q];
+  const Slot j = flights_.packing().slot(candidate);
+  if (j == task.self) return;
+  const double time = flights_.pair_contact(task.self, j, box_.shift(flights_.packing().image(candidate)));
+  if (time <= queue_[task.self].contact && time < kNever) queue_.offer(task.self, time, EventKind::pair, candidate);
+}
+
 /// Plans the first contact with the candidates, computed one by one.
 template <int D>
 void EventSearch<D>::offer_all(const ScanTask& task) {
-  for (unsigned q = 0; q < task.n; ++q) {
-    const std::uint32_t candidate = task.candidates[q];
-    const Slot j = flights_.packing().slot(candidate);
-    if (j == task.self) continue;
-    const double time = flights_.pair_contact(task.self, j, box_.shift(flights_.packing().image(candidate)));
-    if (time <= queue_[task.self].contact && time < kNever) queue_.offer(task.self, time, EventKind::pair, candidate);
-  }
+  for (unsigned q = 0; q < task.n; ++q) offer(task, q);
 }
 
 template <int D>

@@ -77,7 +77,7 @@ class EventSearch {
   /// Plans the first contact with the candidates if it is earlier than the planned one.
   [[gnu::always_inline]] void plan_first(const ScanTask& task, const ScanResult& first) {
     if (flights_.has_steps()) [[unlikely]]
-      return offer_all(task);  // the kernels know contacts of cores only
+      return offer_steps(task);
     const double planned = queue_[task.self].contact;
     if (first.time > planned || first.time == kNever) return;
     if (first.tied || first.time == planned || first.time == -kNever) [[unlikely]]
@@ -88,6 +88,8 @@ class EventSearch {
     counts_.candidates += found.task.count;
     plan_first({i, found.task.candidates, found.task.count, found.task.same}, first);
   }
+  [[gnu::noinline]] void offer_steps(const ScanTask& task);
+  void offer(const ScanTask& task, unsigned q);
   [[gnu::noinline]] void offer_all(const ScanTask& task);  // seldom needed, and large
   [[gnu::noinline]] void cross(Slot i, double now);
   [[gnu::noinline]] void renew_list(Slot i, double now);

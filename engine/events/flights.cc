@@ -45,6 +45,7 @@ void Flights<D>::load(const Particles<D>& particles, const Vec<D>& g, double hor
     if (common_mass_ == 0) mass_.push_back(particles.mass[r.id]);
     r = {particles.x[r.id], particles.v[r.id], 0.0, r.id, 0, particles.species[r.id]};
   }
+  set_surfaces();
   internal_.clear();
   if (has_internal_)
     for (const Record<D>& r : records_) internal_.push_back(particles.internal(r.id));
@@ -55,6 +56,21 @@ void Flights<D>::set_surroundings() {
   walls_ = box_.walls();
   kicks_ = box_.bath.kicks();
   lone_events_ = kicks_ || !walls_.empty();
+}
+
+/// The kernels know steps that all pairs have at the same distances, on straight flights.
+template <int D>
+void Flights<D>::set_surfaces() {
+  surfaces_.clear();
+  const PairSteps* const steps = has_steps_ && equal() && !field_ ? box_.steps.of_all() : nullptr;
+  if (!steps) return;
+  const double sigma = common_radius_ + common_radius_, widest = std::max(kJustMet * sigma, gap_tolerance_(0));
+  const auto add = [&](double distance) {  // with twice the margin of any pair in next_step_time()
+    const double squared = distance * distance;
+    surfaces_.push_back({distance, squared, 2 * (kNearStep * squared + 4 * widest * distance)});
+  };
+  add(steps->core_distance(sigma));
+  for (const StepSurface& each : steps->surfaces) add(each.distance(sigma));
 }
 
 template <int D>
@@ -80,7 +96,9 @@ ScanSetting Flights<D>::setting() const {
                       .slot_mask = packing_.slot_mask,
                       .slot_bits = packing_.slot_bits,
                       .field_bits = packing_.field_bits,
-                      .plain = radius_.empty() && !field_ && growth_ == 0};
+                      .plain = radius_.empty() && !field_ && growth_ == 0,
+                      .surfaces = surfaces_.empty() ? nullptr : surfaces_.data(),
+                      .surface_count = static_cast<unsigned>(surfaces_.size())};
   for (int k = 0; k < D; ++k) {
     setting.edges[k] = box_.edges[k];
     setting.g[k] = g_[k];
@@ -100,6 +118,7 @@ void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, co
   horizon_ = horizon;
   common_radius_ = common(sizes.radius);
   common_mass_ = common(sizes.mass);
+  set_surfaces();
   capacity_ = records_room(records.size());
   packing_ = Packing<D>(capacity_, sizes.spheres);
   records_.clear();

@@ -161,6 +161,7 @@ class Flights {
   [[gnu::noinline]] EventResult<D> meet_step(const StepSurface& step, Slot i, Record<D>& a, Slot j, Record<D>& b,
                                              const Vec<D>& d, std::uint32_t generation) const;
   void set_surroundings();
+  void set_surfaces();
   /// The time at which a sphere touches a wall. Throws Error(Failure::numerical) if it rests there under the field.
   double wall_contact(Slot i, const Record<D>& r, const Wall<D>& wall) const;
   double next_kick(Slot i, const Record<D>& r) const;
@@ -193,6 +194,7 @@ class Flights {
   std::vector<double> radius_, mass_;  // by slot; empty if all are equal
   std::vector<Internal<D>> internal_;  // by slot; empty if spheres have none
   double common_radius_ = 0, common_mass_ = 0;
+  std::vector<ScanSurface> surfaces_;  // for the kernels; empty if they do not know the steps
 };
 
 }  // namespace carom

@@ -49,6 +49,7 @@ std::size_t steps_passed(const PairSteps& steps, const PairMotion<D>& motion, do
 inline constexpr double kNearStep = 1e-9;
 
 /// The time until a pair with straight relative motion reaches its core or a step. `slack()` as in wall_meeting().
+/// step_times() in search/simd/scan_kernel.h gives the same bits for pairs that are not near a step.
 template <int D, class Slack>
 [[gnu::always_inline]] inline double next_step_time(const PairSteps& steps, const Vec<D>& d, const Vec<D>& v,
                                                     double sigma, double tolerance, Slack&& slack) {

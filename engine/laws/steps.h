@@ -107,6 +107,11 @@ class Steps {
     const std::uint32_t list = of_species_[one * species_ + other];
     return list == kNone ? nullptr : &lists_[list];
   }
+  /// The steps of every pair; null: pairs differ, or have none.
+  const PairSteps* of_all() const {
+    const bool same = std::ranges::adjacent_find(of_species_, std::ranges::not_equal_to()) == of_species_.end();
+    return same && bonds_.empty() && !of_species_.empty() ? of_species(0, 0) : nullptr;
+  }
   /// The number of bonds.
   std::size_t bonds() const { return bonds_.size() / 2; }
   /// The number of tethered pairs.

@@ -13,6 +13,12 @@
 
 namespace carom {
 
+/// The core of a pair or one of its steps (../../laws/steps.h).
+struct ScanSurface {
+  double distance, squared;
+  double margin;  ///< of squared distances: nearer to the surface, the side of a pair may not follow from its distance
+};
+
 /// The constants of all scans of one core. Each record has 8 doubles (record.h).
 struct ScanSetting {
   const double* records = nullptr;
@@ -23,7 +29,9 @@ struct ScanSetting {
   double growth = 0;            ///< contact distances are multiplied by 1 + growth·t
   std::uint32_t slot_mask = 0;  ///< selects the slot of a candidate (Packing)
   int slot_bits = 0, field_bits = 0;
-  bool plain = true;  ///< one diameter, no acceleration, no growth
+  bool plain = true;                      ///< one diameter, no acceleration, no growth
+  const ScanSurface* surfaces = nullptr;  ///< for scan_steps: the core and the steps, from the inside out
+  unsigned surface_count = 0;
 };
 
 struct ScanResult {
@@ -32,8 +40,16 @@ struct ScanResult {
   bool tied;            ///< another contact may have the same time: test each
 };
 
+/// What scan_steps finds.
+struct StepScan {
+  ScanResult first;    ///< of the candidates that are not near a surface
+  std::uint64_t near;  ///< the others, as bits: test each
+};
+
 /// The most candidates that a kernel scans together: lists are padded to a multiple.
 inline constexpr unsigned kScanLanes = 4;
+/// Candidates in a block: their times are stored until the smallest is known.
+inline constexpr unsigned kScanBlock = 64;
 
 /// A sphere to scan and its candidates, padded with `self` to a multiple of kScanLanes.
 struct ScanTask {
@@ -125,6 +141,9 @@ struct ScanKernels {
   ScanResult (*scan[2])(const ScanSetting&, const ScanTask&, bool latest);
   /// Scans the two spheres of a collision: no candidate's record may have a later time than theirs.
   void (*scan_two[2])(const ScanSetting&, const ScanTask* task, ScanResult* result);
+  /// The first contact or step of a sphere with at most kScanBlock candidates, all in plain pairs with the surfaces, by
+  /// dimension − 2.
+  StepScan (*scan_steps[2])(const ScanSetting&, const ScanTask&);
   /// Writes the slots of all spheres within the limit and the linear images of their cells; returns their number. The
   /// arrays must have room for all spheres in the cells.
   unsigned (*near)(const NearTask&, std::uint32_t* slots, std::int32_t* away);

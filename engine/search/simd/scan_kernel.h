@@ -42,12 +42,36 @@ inline double smallest(Double<W> x) {
   }
 }
 
-constexpr unsigned kBlock = 64;  // candidates per block: their times are stored until the smallest is known
+/// The formulas of next_step_time() in step_event.h: the time until pairs reach their cores or steps; ∞ or NaN: never.
+/// Sets `near` for pairs within the margin of a surface. The three forms of a root there have equal parts here: a sum
+/// of two positive numbers, and the squared distance from the surface.
+template <class V>
+CAROM_INLINE V step_times(const ScanSetting& s, V b, V d_squared, V v_squared, V cross, IntegerOf<V>& near) {
+  const V none = all<V>(__builtin_inf());
+  V inside = all<V>(s.surfaces[0].distance), outside = none;
+  near = (d_squared - s.surfaces[0].squared <= s.surfaces[0].margin) & (d_squared > 0.0);  // without the padding
+  for (unsigned k = 1; k < s.surface_count; ++k) {
+    const ScanSurface& surface = s.surfaces[k];
+    const V gap = d_squared - surface.squared;
+    near |= elementary::abs(gap) <= surface.margin;
+    inside = gap < 0.0 ? inside : all<V>(surface.distance);
+    outside = gap < 0.0 ? elementary::min(outside, all<V>(surface.distance)) : outside;
+  }
+  const V to_inside = v_squared * inside * inside - cross;
+  const IntegerOf<V> enters = (b < 0.0) & (to_inside > 0.0);
+  const V distance = enters ? inside : outside;
+  const V sum = elementary::sqrt(enters ? to_inside : v_squared * outside * outside - cross) + elementary::abs(b);
+  const IntegerOf<V> turns = (b <= 0.0) & ~enters;  // it misses the inner surface
+  return (turns ? sum : elementary::abs(d_squared - distance * distance)) / (turns ? v_squared : sum);
+}
 
-/// Writes the times of contact with n ≤ kBlock candidates, of which the first `same` are in the same box: ∞ or NaN for
-/// no contact; −∞ if the two overlap and approach. Returns the smallest time in each lane. `fresh`: the
-/// candidates have just been written by stores that overlap, so that loading several at once is slow.
-template <int D, int W, bool latest, bool plain, bool fresh = false>
+enum class Pairs { plain, general, stepped };  // ScanSetting::plain; plain with ScanSetting::surfaces
+
+/// Writes the times of contact with n ≤ kScanBlock candidates, of which the first `same` are in the same box: ∞ or NaN
+/// for no contact; −∞ if the two overlap and approach, or are within the margin of a surface. Returns the smallest time
+/// in each lane, without those within a margin. `fresh`: the candidates have just been written by stores that overlap,
+/// so that loading several at once is slow.
+template <int D, int W, bool latest, Pairs pairs, bool fresh = false>
 inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting& s, std::uint32_t self,
                                                               const std::uint32_t* candidates, unsigned n,
                                                               unsigned same, double* times) {
@@ -73,7 +97,7 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
       d[k] = (field[k] + s_j * field[D + k]) - (latest ? x_i[k] : x_i[k] + s_i * v_i[k]);
       v[k] = field[D + k] - v_i[k];
     }
-    if constexpr (!plain) {
+    if constexpr (pairs == Pairs::general) {
       const V half = 0.5 * (s_i * s_i - s_j * s_j), difference = s_i - s_j;
       for (int k = 0; k < D; ++k) {
         d[k] -= half * s.g[k];
@@ -107,7 +131,12 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
       cross = z * z;
     }
     V time;
-    if constexpr (plain) {
+    if constexpr (pairs == Pairs::stepped) {
+      IntegerOf<V> near;
+      time = now + step_times(s, b, d_squared, v_squared, cross, near);
+      best = elementary::min(near ? none : time, best);
+      return store(to, near ? -none : time);
+    } else if constexpr (pairs == Pairs::plain) {
       const V c = d_squared - sigma * sigma;
       const V discriminant = v_squared * sigma * sigma - cross;
       time = now + c / (elementary::sqrt(discriminant) - b);
@@ -137,25 +166,32 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
   return best;
 }
 
+/// The indices, as bits, at which n times have this value.
+template <int W>
+inline std::uint64_t places_of(double value, const double* times, unsigned n) {
+  std::uint64_t at = 0;
+  for (unsigned q = 0; q < n; q += W) {
+    at |= static_cast<std::uint64_t>(bits(load<Double<W>>(times + q) == value)) << q;
+  }
+  return at;
+}
+
 /// Finds the first of n times, given the smallest time in each lane.
 template <int W>
 inline ScanResult first_of(const double* times, unsigned n, Double<W> best) {
   const double first = smallest<W>(best);
-  std::uint64_t at = 0;
-  for (unsigned q = 0; q < n; q += W) {
-    at |= static_cast<std::uint64_t>(bits(load<Double<W>>(times + q) == first)) << q;
-  }
+  const std::uint64_t at = places_of<W>(first, times, n);
   return {first, static_cast<std::uint32_t>(__builtin_ctzll(at | std::uint64_t{1} << 63)), (at & (at - 1)) != 0};
 }
 
-template <int D, int W, bool latest, bool plain>
+template <int D, int W, bool latest, Pairs pairs>
 __attribute__((noinline)) ScanResult scan_blocks(const ScanSetting& s, const ScanTask& task) {
-  alignas(64) double times[kBlock];
+  alignas(64) double times[kScanBlock];
   ScanResult result{__builtin_inf(), 0, false};
-  for (unsigned start = 0; start < task.n; start += kBlock) {
-    const unsigned n = task.n - start < kBlock ? task.n - start : kBlock;
+  for (unsigned start = 0; start < task.n; start += kScanBlock) {
+    const unsigned n = task.n - start < kScanBlock ? task.n - start : kScanBlock;
     const unsigned same = task.same > start ? (task.same - start < n ? task.same - start : n) : 0;
-    const auto best = contact_times<D, W, latest, plain>(s, task.self, task.candidates + start, n, same, times);
+    const auto best = contact_times<D, W, latest, pairs>(s, task.self, task.candidates + start, n, same, times);
     const ScanResult some = first_of<W>(times, n, best);
     if (some.time < result.time)
       result = {some.time, start + some.which, some.tied};
@@ -167,29 +203,38 @@ __attribute__((noinline)) ScanResult scan_blocks(const ScanSetting& s, const Sca
 
 template <int D, int W, bool latest>
 ScanResult scan_plain(const ScanSetting& s, const ScanTask& task) {
-  if (task.n > kBlock) return scan_blocks<D, W, latest, true>(s, task);
-  alignas(64) double times[kBlock];
-  const auto best = contact_times<D, W, latest, true>(s, task.self, task.candidates, task.n, task.same, times);
+  if (task.n > kScanBlock) return scan_blocks<D, W, latest, Pairs::plain>(s, task);
+  alignas(64) double times[kScanBlock];
+  const auto best = contact_times<D, W, latest, Pairs::plain>(s, task.self, task.candidates, task.n, task.same, times);
   return first_of<W>(times, task.n, best);
 }
 
 template <int D, int W>
 ScanResult scan(const ScanSetting& s, const ScanTask& task, bool latest) {
-  if (!s.plain) return scan_blocks<D, W, false, false>(s, task);
+  if (!s.plain) return scan_blocks<D, W, false, Pairs::general>(s, task);
   return latest ? scan_plain<D, W, true>(s, task) : scan_plain<D, W, false>(s, task);
+}
+
+/// As scan(), for pairs with surfaces.
+template <int D, int W>
+StepScan scan_steps(const ScanSetting& s, const ScanTask& task) {
+  alignas(64) double times[kScanBlock];
+  const auto best = contact_times<D, W, false, Pairs::stepped>(s, task.self, task.candidates, task.n, task.same, times);
+  return {first_of<W>(times, task.n, best), places_of<W>(-__builtin_inf(), times, task.n)};
 }
 
 /// Scans two spheres at once, so that the processor overlaps the end of one scan with the start of the other.
 template <int D, int W>
 void scan_two(const ScanSetting& s, const ScanTask* task, ScanResult* result) {
-  if (!s.plain || task[0].n > kBlock || task[1].n > kBlock) {
+  if (!s.plain || task[0].n > kScanBlock || task[1].n > kScanBlock) {
     for (int k = 0; k < 2; ++k) result[k] = scan<D, W>(s, task[k], true);
     return;
   }
-  alignas(64) double times[2][kBlock];
+  alignas(64) double times[2][kScanBlock];
   Double<W> best[2];
   for (int k = 0; k < 2; ++k)
-    best[k] = contact_times<D, W, true, true>(s, task[k].self, task[k].candidates, task[k].n, task[k].same, times[k]);
+    best[k] =
+        contact_times<D, W, true, Pairs::plain>(s, task[k].self, task[k].candidates, task[k].n, task[k].same, times[k]);
   for (int k = 0; k < 2; ++k) result[k] = first_of<W>(times[k], task[k].n, best[k]);
 }
 
@@ -397,11 +442,11 @@ ScanResult search(const ScanSetting& s, CellsTask& task, bool latest) {
   task.same = (any & ~kMoreInCell) >> s.slot_bits == 0 ? task.count : 0;
   const std::uint32_t self = task.self & s.slot_mask;
   if (task.count == 0) return {__builtin_inf(), 0, false};
-  if (!s.plain || task.count > kBlock) return scan<D, W>(s, {self, task.candidates, task.count, task.same}, latest);
-  alignas(64) double times[kBlock];
+  if (!s.plain || task.count > kScanBlock) return scan<D, W>(s, {self, task.candidates, task.count, task.same}, latest);
+  alignas(64) double times[kScanBlock];
   const auto best =
-      latest ? contact_times<D, W, true, true, true>(s, self, task.candidates, task.count, task.same, times)
-             : contact_times<D, W, false, true, true>(s, self, task.candidates, task.count, task.same, times);
+      latest ? contact_times<D, W, true, Pairs::plain, true>(s, self, task.candidates, task.count, task.same, times)
+             : contact_times<D, W, false, Pairs::plain, true>(s, self, task.candidates, task.count, task.same, times);
   return first_of<W>(times, task.count, best);
 }
 

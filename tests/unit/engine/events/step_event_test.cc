@@ -168,6 +168,20 @@ TEST(StepEvent, TheNearestDistanceSaysWhatIsReached) {
   EXPECT_EQ(step_at(steps, 4.01, 2), &steps.surfaces[1]);
 }
 
+TEST(Steps, KnowWhetherAllPairsHaveTheSame) {
+  Steps steps;
+  EXPECT_EQ(steps.of_all(), nullptr);
+  steps.resize(2);
+  const std::uint32_t list = steps.add(well());
+  for (const auto& [one, other] : {std::pair{0, 0}, {0, 1}, {1, 1}}) {
+    EXPECT_EQ(steps.of_all(), nullptr);
+    steps.set_pair(one, other, list);
+  }
+  EXPECT_EQ(steps.of_all(), steps.of_species(0, 1));
+  steps.bond(3, 4, list);
+  EXPECT_EQ(steps.of_all(), nullptr);
+}
+
 TEST(Steps, BondsComeBeforeSpecies) {
   Steps steps;
   steps.resize(2);

@@ -130,7 +130,7 @@ TEST(Search, GrowingSpheres) {
       {.system = random_system<2>(60, {9, 9}, {W, P}, 0.2, 0.4, 13), .growth = 0.1, .slab = 0.5}, 100);
 }
 
-TEST(Search, ExactTies) {  // a lattice with speeds of 1: whole layers collide at one instant
+Case<3> lattice() {  // with speeds of 1: whole layers collide at one instant
   std::vector<Vec<3>> x, v;
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j < 6; ++j)
@@ -138,7 +138,64 @@ TEST(Search, ExactTies) {  // a lattice with speeds of 1: whole layers collide a
         x.push_back({1.5 * i + 0.75, 1.5 * j + 0.75, 1.5 * k + 0.75});
         v.push_back({i % 2 == 0 ? 1.0 : -1.0, j % 2 == 0 ? 1.0 : -1.0, 0.0});
       }
-  expect_the_same_whatever_the_search<3>({.system = test::make_system<3>({9, 9, 9}, P, x, v), .slab = 2}, 400);
+  return {.system = test::make_system<3>({9, 9, 9}, P, x, v), .slab = 2};
+}
+
+TEST(Search, ExactTies) { expect_the_same_whatever_the_search<3>(lattice(), 400); }
+
+/// Runs with a well, a shoulder and several steps, of which one is too far out for a block of candidates. The reference
+/// has each as two equal lists, with which EventSearch tries the candidates one by one. `known`: the kernels know them
+/// as one list.
+template <int D, class Make>
+void expect_the_same_with_steps(Make&& make, bool known = true) {
+  const std::vector<std::vector<StepSurface>> all = {
+      {{.range = 1.5, .climb = 1}},
+      {{.range = 1.3, .climb = -0.7}},
+      {{.range = 1.2, .climb = -0.3}, {.range = 1.6, .climb = 0.8}, {.range = 2.7, .climb = 0.1}}};
+  for (const auto& surfaces : all) {
+    const auto with_steps = [&](bool one_list) {
+      Case<D> c = make();
+      Steps& steps = c.system->box.steps;
+      steps.resize(2);
+      const std::uint32_t list = steps.add({surfaces});
+      for (const std::size_t other : {0, 1}) steps.set_pair(0, other, list);
+      steps.set_pair(1, 1, one_list ? list : steps.add({surfaces}));
+      Flights<D> flights(c.system->box);
+      flights.load({}, Sizes(c.system->particles), c.g, 1);
+      EXPECT_EQ(flights.setting().surfaces != nullptr, one_list && known);
+      return c;
+    };
+    const auto reference = run(with_steps(false), {.method = Method::lists});
+    EXPECT_GT(reference.contacts.size(), 100) << surfaces.front().range;
+    const Case<D> c = with_steps(true);
+    for (const std::size_t width : vector_widths())
+      for (const Method method : {Method::lists, Method::cells}) {
+        const char* const simd = kVectorWidths[width].name;
+        expect_same(reference, run(c, {.method = method}, simd), simd);
+      }
+  }
+}
+
+template <int D>
+auto fluid_of(int cells, double filled, double slab) {
+  return [=] { return Case<D>{.system = test::hard_spheres<D>(cells, filled), .slab = slab, .slabs = 2}; };
+}
+
+TEST(Search, Steps) {
+  expect_the_same_with_steps<3>(fluid_of<3>(4, 0.45, 0.05));
+  expect_the_same_with_steps<3>(fluid_of<3>(4, 0.05, 0.6));
+  expect_the_same_with_steps<2>(fluid_of<2>(10, 0.6, 0.1));
+  expect_the_same_with_steps<2>(fluid_of<2>(10, 0.05, 1.5));
+  expect_the_same_with_steps<3>(lattice);
+  for (const double smallest : {0.4, 0.5}) {  // spheres of several sizes, or in a field
+    const auto make = [&] {
+      return Case<3>{.system = random_system<3>(150, {7, 7, 7}, {P, P, P}, smallest, 0.5, 14),
+                     .g = Vec<3>(0, 0, smallest == 0.5 ? -1 : 0),
+                     .slab = 0.3,
+                     .slabs = 2};
+    };
+    expect_the_same_with_steps<3>(make, false);
+  }
 }
 
 TEST(Search, BlowsFromBothSides) {  // two touching spheres are hit at one instant, repeatedly
@@ -346,6 +403,37 @@ TEST(Scan, SeesAnOverlapHoweverSlowlyItGrows) {
       for (const auto& result : {scan<3, 2>(s.setting, task, latest), scan<3, 4>(s.setting, task, latest)})
         EXPECT_EQ(result.time, -kNever) << approach;
   }
+}
+
+TEST(Scan, LeavesPairsAtAStepOut) {
+  Surroundings<3> s(true);
+  const ScanSurface surfaces[] = {{1, 1, 1e-6}, {2, 4, 1e-6}};
+  s.setting.surfaces = surfaces;
+  s.setting.surface_count = 2;
+  for (Slot j = 0; j < 31; ++j) {
+    s.records[j] = {{30, 0, 0}, Vec<3>::Zero(), 0, j, 0, 0};
+    if (j > 0) s.candidates[j - 1] = s.packing.pack(j, 0);
+  }
+  s.records[0].x = Vec<3>::Zero();
+  const auto expect = [&](std::uint64_t near, double time, unsigned which) {
+    const ScanTask task{0, s.candidates.data(), 30, 30};
+    for (const StepScan& found : {scan_steps<3, 2>(s.setting, task), scan_steps<3, 4>(s.setting, task)}) {
+      EXPECT_EQ(found.near, near);
+      EXPECT_EQ(found.first.time, time);
+      EXPECT_TRUE(found.first.which == which || !std::isfinite(time)) << found.first.which;
+    }
+  };
+  expect(0, kNever, 0);
+  s.records[11] = {{3, 0, 0}, {-1, 0, 0}, 0, 11, 0, 0};
+  expect(0, 1, 10);
+  s.records[21] = {{1.5, 0, 0}, {4, 0, 0}, 0, 21, 0, 0};
+  expect(0, 0.125, 20);
+  for (const double at : {1 - 1e-8, 1 + 1e-8, 2 - 1e-8, 2 + 1e-8, 0.7}) {
+    s.records[21].x[0] = at;
+    expect(1 << 20, 1, 10);
+  }
+  s.records[30].x[0] = 2;
+  expect(1 << 20 | 1 << 29, 1, 10);
 }
 
 /// Random spheres in cells, with walls across the second axis.
