@@ -17,6 +17,7 @@ if "TMPDIR" not in os.environ and os.access(MEMORY, os.W_OK):
 def pytest_configure(config):
     config.addinivalue_line("markers", "kills_mpirun: ends mpirun or one of its ranks, after which mpirun itself may hang; "
                                        "runs as the CTest test cli.killed_mpirun")
+    config.addinivalue_line("markers", "slow: takes more than a quarter of a minute; runs as a CTest test with the label slow")
 
 
 def pytest_sessionfinish(session, exitstatus):

@@ -205,6 +205,7 @@ DECK_ERRORS = {
     "steps next to a law of contacts": (
         stepped('between = ["*", "*"]\nrange = 1.5\ndepth = 1.0\n[[contact]]\nbetween = ["*", "*"]\nrestitution = 0.9'),
         9, ["come to rest at the ranges", "take free-flight"]),
+    "tethers without pairs": (stepped("within = 2.0\ntether = 4.0"), 9, ["no particles stand within 2", "a larger 'within'"]),
     "steps with cva": (
         stepped('between = ["*", "*"]\nrange = 1.5\ndepth = 1.0', "cva"), 9, ["'cva' does not know steps", "take one of: free-flight, psa, cdda, edda"]),
     "wall that is shaken without a frequency": (
@@ -328,8 +329,6 @@ IMPOSSIBLE_STATES = {
     "lattice too dense": (
         changed("box = [6.0, 6.0, 6.0]", "box = [3.6, 3.6, 3.6]", FLUID),
         ["pairs of spheres overlap", "contact distance 1"]),
-    "tethers without pairs": (
-        stepped("within = 2.0\ntether = 4.0"), ["no particles stand within 2", "a larger 'within'"]),
     "tether that is too short": (
         stepped("pairs = [[0, 1]]\ntether = 2.0"), ["particles 0 and 1 start at a distance of 3", "their tether is 2 long", "a longer tether"]),
     "tether that is no longer than the contact distance": (

@@ -68,7 +68,7 @@ LAWS = tomllib.loads(DISCS) | {
              {"name": "y-", "velocity": {"amplitude": 0.2, "frequency": 0.5}}],
     "particles": [{"name": "large", "count": 120, "temperature": 1.0, "rotational_temperature": 0.5, "radius": 0.6, "mass": 2.0},
                   {"name": "small", "count": 80, "temperature": 1.0, "radius": 0.4, "inertia": 0.9}],
-    "run": {"end_time": 2.0}}
+    "run": {"end_time": 1.5}}
 WIDTHS = [width for width, flag in (("sse2", "sse2"), ("avx2", "avx2"), ("avx512", "avx512f"))
           if flag in pathlib.Path("/proc/cpuinfo").read_text().split()]
 
@@ -101,7 +101,7 @@ def test_every_law_on_ranks_at_all_vector_widths_and_after_a_kill(method, bath, 
         output.append(f"integrator.accuracy={accuracy}")
     run(deck, plain, output)
     energy = summary(plain)["energy"]
-    assert energy["dissipated"] > 1 and abs(energy["work"]) > 1 and abs(energy["heat"]) > 1 and energy["rotational"] > 1
+    assert energy["dissipated"] > 1 and abs(energy["work"]) > 0.3 and abs(energy["heat"]) > 1 and energy["rotational"] > 1
     if method in ("free-flight", "edda", "cdda"):
         assert energy["max_abs_error"] < 1e-12 * energy["reference"]
     by_place = method in ("free-flight", "psa", "edda")  # the other methods share the forces only
@@ -119,7 +119,7 @@ STEPS = tomllib.loads(SPHERES) | {
              {"between": ["small", "small"], "range": 1.5, "depth": -0.3},
              {"pairs": [[2 * k, 2 * k + 1] for k in range(20)], "range": 1.5, "unit": "length", "depth": 0.1, "tether": 1.8}],
     "bath": [{"type": "langevin", "temperature": [1.0, 2.0], "friction": [0.5, 1.5]}],
-    "run": {"end_time": 2.0},
+    "run": {"end_time": 1.2},
     "output": {"directory": "unused", "frame_interval": 0.2, "thermo_interval": 0.05}}
 
 
@@ -179,8 +179,9 @@ def test_tethers_between_the_neighbours_in_a_lattice(killer, tmp_path):
     run(deck, plain, output)
     assert summary(plain)["events"]["bounced"] > 500
     with h5py.File(plain / "trajectory.h5md") as file:
-        bonds = file["connectivity/bonds"][:]
-    assert len(bonds) == 2 * 144 and np.array_equal(np.bincount(bonds.ravel()), np.full(144, 4))  # the four neighbours of each disc
+        ends = np.concatenate([file[f"parameters/vmd_structure/bond_{end}"][:] for end in ("from", "to")])
+    ids, bonds = np.unique(ends, return_counts=True)
+    assert len(ids) == 144 and np.all(bonds == 4)  # the neighbours of each disc
     expect_same_anywhere(deck, output, plain, killer, (2, 3))
     again = subprocess.run([CAROM, "branch", plain, "-o", tmp_path / "branch", "--set", "step.0.within=1.3"], capture_output=True, text=True)
     assert again.returncode == 2 and "bonds are given twice" in again.stderr
@@ -312,7 +313,7 @@ def test_an_equilibrated_run_on_ranks_and_after_a_kill(fluid, killer, tmp_path):
               "output.rdf_interval=0.1", "output.sk_interval=0.2", "output.sk_bins=5", "output.checkpoint_wall=\"0\"",
               "output.transport_interval=0.08", "output.pressure_tensor_interval=0.05",
               *(["integrator.step=0.03", "run.end_time=5.6", "output.thermo_interval=0.04", "interaction.0.cutoff=2.0"] if fluid == "yukawa-fluid"
-                else ["integrator.step=0.2", "output.thermo_interval=0.03", "run.end_time=6"])]
+                else ["integrator.step=0.2", "output.thermo_interval=0.03", f"run.end_time={9 if fluid == 'square-well' else 6}"])]
     run(deck, plain, output)
     found = summary(plain)["equilibration"]
     assert 0 < found["transient_end"] <= found["start"] / 2 + 0.25 and 3 <= found["start"] < 5.5

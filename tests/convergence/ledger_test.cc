@@ -187,7 +187,7 @@ double adiabat(double line, double from, double to) {
 
 /// A piston at constant speed does the work ∫ force·speed dt; if it is slow, the temperature follows the adiabat. The
 /// potential is weak enough to leave the adiabat alone, but nothing of it is left out.
-TEST(Adiabat, OfASlowPistonWithForces) {
+TEST(AdiabatSlow, OfASlowPistonWithForces) {
   constexpr std::size_t kSpheres = 256;
   constexpr double kLong = 30, kWide = 8, kSpeed = 0.1, kEnd = 0.4 * kLong / kSpeed;
   const double expected = adiabat(kSpheres / (kWide * kWide), kLong, 0.6 * kLong);

@@ -10,7 +10,7 @@
 namespace carom::long_run_test {
 namespace {
 
-TEST(LongRun, AMillionStepsOfBothExperiments) {
+TEST(LongRunSlow, AMillionStepsOfBothExperiments) {
   for (auto start : {test::five_springs, test::nine_gravity}) {
     const auto run = test::run_steps<2>(start(0), "cdda", 0.01, 1000000);
     const auto& s = run->statistics();

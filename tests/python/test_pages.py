@@ -11,13 +11,18 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 TUTORIALS = sorted((ROOT / "inputs" / "tutorials").glob("[0-9]*.md")) + sorted((ROOT / "inputs" / "tutorials" / "python").glob("[0-9]*.md"))
 GUIDE = sorted((ROOT / "inputs" / "guide").glob("*.md"))
 PAGES = TUTORIALS + GUIDE + [ROOT / "tools" / "site" / "gallery.md"]
+SLOW = ["tutorials/1-equation-of-state", "tutorials/2-thesis-figures", "tutorials/9-wells-and-cavities"]
 
 
 def run_page(page):
     return subprocess.run(["/usr/bin/python3", ROOT / "tools" / "run_page.py", page], capture_output=True, text=True, timeout=3000)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}/{page.stem}")
+def name_of(page):
+    return f"{page.parent.name}/{page.stem}"
+
+
+@pytest.mark.parametrize("page", [pytest.param(page, marks=[pytest.mark.slow] * (name_of(page) in SLOW)) for page in PAGES], ids=name_of)
 def test_a_page_prints_what_it_says(page):
     done = run_page(page)
     assert done.returncode == 0, done.stdout + done.stderr
