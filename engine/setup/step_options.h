@@ -14,8 +14,8 @@ namespace carom {
 const std::vector<Parameter>& step_parameters();
 
 /// Gives pairs these steps: all pairs of two species, or listed pairs of a system with this many particles; none for
-/// `within`, until find_step_bonds() has listed them. These parameters are complete. Steps of two species replace earlier ones of these two. Throws Error(Failure::deck), also
-/// if a pair is bonded twice.
+/// `within`, until find_step_bonds() has listed them. These parameters are complete. Steps of two species replace
+/// earlier ones of these two. Throws Error(Failure::deck), also if a pair is bonded twice.
 template <int D>
 void add_step(Box<D>& box, std::span<const std::string> species, std::size_t particles, const Parameters& given);
 
