@@ -6,11 +6,11 @@
     tools/python tools/chain_relaxation.py --beads 4,8,16 --times 60                       # half a minute
 
 The distance of neighbours is between 1 and 1.2. Beads are points that pass through each other, or spheres of diameter 1. Each chain is
-alone, and an Andersen bath kicks its beads at a rate that is their friction. Of the slowest Rouse mode of a chain of n beads,
+alone, and an Andersen bath kicks its beads at a rate that is their friction. The slowest Rouse mode of a chain of n beads is
 
     X = sum over k of c[k] r[k],    c[k] = sqrt(2/n) cos(pi (k + 1/2) / n),
 
-the relaxation time is that in which the correlation <X(t) X(0)> falls to 1/e. The table compares it with that of the Rouse model, b^2 m rate /
+and its relaxation time is the time in which the correlation <X(t) X(0)> falls to 1/e. The table compares it with that of the Rouse model, b^2 m rate /
 (12 kT sin^2(pi/2n)), where b^2 is the mean square of a bond, and with m rate <X^2> / (3 kT), which is the same for bonds that are
 independent. Errors are standard errors from the chains (jackknife). The exponent is fitted to all n.
 """

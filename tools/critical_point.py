@@ -6,7 +6,8 @@
     tools/python tools/critical_point.py --temperatures 1,1.05,1.1 --edge 6 --length 36 --time 400      # half a minute
 
 A slab of liquid of edge x edge evaporates in a periodic box of edge x edge x length until its vapour is saturated, in an Andersen bath.
-The density of the liquid is that within 0.08 box lengths of the middle of the slab, the density of the vapour that beyond 0.36 box lengths.
+The density of the liquid is taken within 0.08 box lengths of the middle of the slab, and the density of the vapour farther away than
+0.36 box lengths.
 Errors are standard errors of 16 blocks of time. The critical temperature Tc follows from fits of the difference of the densities by
 A t^0.326, where t = 1 - T/Tc, and by A t^0.326 + B t^0.826, which has the first correction to this law (Wegner, Phys. Rev. B 5 (1972)
 4529). The critical density follows from the law of rectilinear diameters: the mean of both densities is linear in T. Errors of the fits

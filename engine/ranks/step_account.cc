@@ -25,7 +25,8 @@ void StepAccount::check(const Steps& steps, double by_events, const std::string&
 
 namespace {
 
-/// Calls visit(lo, hi, steps outside of which they are) for the pairs of this rank that are inside of a step.
+/// Calls visit(lo, hi, surfaces) for the pairs of this rank that are inside of a step. `surfaces`: the ones that the
+/// pair is inside of.
 template <int D, class Visit>
 void visit_pairs_inside(const System<D>& system, const Particles<D>& state, NeighbourList<D>* known, Visit&& visit) {
   const Box<D>& box = system.box;

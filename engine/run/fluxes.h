@@ -93,7 +93,8 @@ class FluxIntegral {
     for (const Contact<D>& each : contacts) {
       const bool pair = each.key.kind == EventKind::pair;
       Fluxes<D> jump;
-      const auto bounced = [&](Id i, const Vec<D>& v, const Vec<D>& impulse) {  // returns the energy that i gets
+      const auto bounced = [&](Id i, const Vec<D>& v,
+                               const Vec<D>& impulse) {  // returns the kinetic energy that i gets
         if (!(mass_[i] > 0)) return 0.0;
         const Vec<D> after = v - drift_, before = after - impulse / mass_[i];
         jump.add_kinetic(mass_[i], after);
@@ -115,11 +116,12 @@ class FluxIntegral {
       moments_.add(slab_start + each.key.time - time_, jump);
       const Vec<D> d = each.x_lo - each.x_hi;
       jumps_.contacts += d * each.impulse.transpose();
-      transferred_ += (0.5 * (gained - other)) * d;
+      transferred_ += (0.5 * (gained - other)) * d;  // each partner also gets half of what a step stores
     }
   }
 
-  /// Makes the energy of steps part of the heat flux: step_energies() at the first sample, before to().
+  /// Makes the energy of steps part of the heat flux. `energies`: what step_energies() says at the first sample. Call
+  /// this before the first to().
   void add_steps(std::vector<double> energies) { of_steps_ = std::move(energies); }
 
   /// The integrals over the time since the last sample; zero at the first one, and on other ranks than the first.

@@ -59,8 +59,8 @@ Measurement<D> measure(const System<D>& system, const Particles<D>& state, const
 
 /// The pressure for a virial [energy].
 template <int D>
-double pressure_of(double virial, const Box<D>& box) {
-  return virial / (D * box.volume());
+double pressure_of(double virial, const Box<D>& box, double time) {
+  return virial / (D * box.lengths(time).prod());
 }
 
 }  // namespace carom

@@ -55,7 +55,7 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
       rows_(plan.thermo_interval),
       tail_(tail_of(system)) {
   statistics.tail_energy = tail_.energy;
-  statistics.tail_pressure = pressure_of(tail_.virial, system.box);
+  statistics.tail_pressure = pressure_of(tail_.virial, system.box, system.box.time);
   if (system.keeps_momentum()) statistics.max_momentum_error = 0;
   for (auto* observer : observers)
     if (observer->sampling().interval > 0) samplers_.push_back({observer, Schedule(observer->sampling())});
@@ -272,7 +272,7 @@ void Monitor<D>::add_to_series(const Waiting& slab, double path) {
   const double virial = elapsed * account_.virial + since(tally.collision_virial, account_.sampled_virial);
   const double flights = 2 * collisions / static_cast<double>(system_.size());  // of a sphere
   constexpr double none = std::numeric_limits<double>::quiet_NaN();             // the volume varies
-  values_ = {system_.box.plain() ? pressure_of(virial, system_.box) : none,
+  values_ = {system_.box.plain() ? pressure_of(virial, system_.box, shot_.time) : none,
              shot_.temperature * elapsed,
              shot_.potential * elapsed,
              flights,
@@ -392,7 +392,7 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
   const double collisions = account_.last_row >= 0 && shot.time > account_.last_row
                                 ? (collision_virial - account_.last_row_virial) / (shot.time - account_.last_row)
                                 : 0;  // no collisions before the start
-  shot.pressure = pressure_of(account_.virial + collisions, system_.box);
+  shot.pressure = pressure_of(account_.virial + collisions, system_.box, shot.time);
   shot.max_energy_error = statistics_.max_energy_error;
   // Only whole intervals count: the first row has had no collisions, the last one may be early.
   if (row && waits() && !transient_end_ && rows_.due() <= now && shot.time > statistics_.start_time)

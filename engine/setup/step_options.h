@@ -13,14 +13,14 @@ namespace carom {
 
 const std::vector<Parameter>& step_parameters();
 
-/// Gives pairs these steps: all pairs of two species, or listed pairs of a system with this many particles; none for
-/// `within`, until find_step_bonds() has listed them. These parameters are complete. Steps of two species replace
-/// earlier ones of these two. Throws Error(Failure::deck), also if a pair is bonded twice.
+/// Gives pairs these steps: all pairs of two species, or listed pairs of a system with this many particles. With
+/// `within` no pair gets steps until find_step_bonds() has listed them. These parameters are complete. Steps of two
+/// species replace earlier ones of these two. Throws Error(Failure::deck), also if a pair is bonded twice.
 template <int D>
 void add_step(Box<D>& box, std::span<const std::string> species, std::size_t particles, const Parameters& given);
 
-/// Replaces `within` by the `pairs` that are this near in the positions of the context. Throws Error(Failure::deck) if
-/// there are none.
+/// Replaces `within` by `pairs`: the ones that are at most this far apart in the positions of the context. Throws
+/// Error(Failure::deck) if there are none.
 template <int D>
 void find_step_bonds(Parameters& given, const InteractionContext<D>& context);
 

@@ -95,7 +95,7 @@ class ContactScan {
   /// Makes the velocities of contacts that were held over a piece tangential at its end, x, and conserves their energy
   /// (the normal velocity that a held piece of finite length leaves would make the pair bounce at once). Returns the
   /// energy that is missing afterwards. The piece ends `later` after the present time of the box. Contacts of spheres
-  /// that have got an impulse at its end keep their velocities.
+  /// that are `hit`, because an event within the piece has changed their velocities, are left out.
   double slide(Positions<D> x, Vectors<D> v, double later = 0, const std::function<bool(Id)>& hit = {});
   /// Whether all held contacts approach or open more slowly than their rest speeds, so that slide() ends slow motion
   /// and does not turn a fast pair.
@@ -177,7 +177,7 @@ class ContactScan {
   double count_push(const RestingContact<D>& contact, double impulse, double speed);
   double stop_rounding(Vectors<D> v) const;
   Vec<D> normal(const EventKey<D>& key, Positions<D> x) const { return contact_normal<D>(box_, particles_, key, x); }
-  /// Whether one of the partners has got an impulse.
+  /// Whether one of the partners is hit.
   static bool was_hit(const EventKey<D>& key, const std::function<bool(Id)>& hit) {
     return hit && (hit(key.lo) || (key.kind == EventKind::pair && hit(key.hi)));
   }

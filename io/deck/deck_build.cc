@@ -150,7 +150,8 @@ InteractionContext<D> context_of(const Deck::Source& source, const System<D>& sy
           .ranks = system.decomposition.others()};
 }
 
-/// Adds the steps of pairs that are near each other in the initial state; the resolved deck lists these pairs.
+/// Adds the steps of pairs that are near each other in the initial state. The resolved deck lists these pairs, so that
+/// a run that goes on has them.
 template <int D>
 void bond_near(Deck::Source& source, System<D>& system, Problems& problems) {
   for (ValueTable& step : source.values.list("step")) {
@@ -217,7 +218,10 @@ void make_interactions(const Deck::Source& source, System<D>& system, bool place
   for (std::size_t n = 0; n < all.size(); ++n)
     if (bonded(all[n])) make(n);
   context.bonds = bonds_of(terms, system.box.steps);
-  if (!context.bonds && std::ranges::any_of(all, bonded)) context.bonds = std::make_shared<BondTable>(PairList());
+  const bool later =
+      std::ranges::any_of(all, bonded) ||
+      std::ranges::any_of(source.values.list("step"), [](const auto& step) { return step.values.has("within"); });
+  if (!context.bonds && later) context.bonds = std::make_shared<BondTable>(PairList());
   for (std::size_t n = 0; n < all.size(); ++n)
     if (!bonded(all[n])) make(n);
   for (auto& term : terms)

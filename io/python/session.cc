@@ -354,9 +354,9 @@ void Session<D>::add_step(Parameters given) {
   if (size_ == 0) refuse("step: there are no particles yet; call add_particles() first");
   auto all = values_.list("step");
   all.push_back(table_of("step", std::move(given)));
-  change("add steps");
   find_step_bonds<D>(all.back().values, {.box = box_, .particles = system_->particles, .species = species_});
   set_pair_steps(std::move(all));
+  change("add steps");
 }
 
 /// Sets these steps for the present species and particles.
@@ -562,7 +562,7 @@ const Snapshot<D>& Session<D>::shot() {
   const Measurement<D> now = measure(system, system.particles, system.particles,
                                      evaluate_energy<D>(system, system.particles.x), tail_of(system));
   shot_ = now.shot;
-  shot_->pressure = pressure_of(now.virial, box_);
+  shot_->pressure = pressure_of(now.virial, box_, box_.time);
   shot_->time = statistics_.end_time;
   shot_->step = statistics_.steps;
   shot_->collisions = statistics_.counters.sphere_sphere;

@@ -620,7 +620,7 @@ def test_wells_and_friction_are_those_of_a_deck(tmp_path):
     assert same_state(deck, hand) and hand.potential == deck.potential != -6 * 108
     with pytest.raises(carom.UsageError, match="'ion' is no species; give one of: sphere"):
         hand.add_step("ion", "*", range=1.5, depth=1.0)
-    assert len(hand.steps) == 1
+    assert len(hand.steps) == 1 and hand.time == deck.time and same_state(deck, hand)
 
     brownian = gas(27)
     brownian.add_bath("langevin", temperature=2.0, friction=[5.0])

@@ -87,8 +87,10 @@ PairFilter filter(std::string_view type, const Parameters& parameters, const Int
   const SpeciesPair species = species_pair(type, parameters, context.species);
   const bool exclude = parameters.has("exclude") && parameters.text("exclude") == "bonded";
   if (exclude && !context.bonds)
-    refuse(type,
-           "exclude = \"bonded\" leaves out bonded pairs, but there are no bonds; leave it out or add a harmonic-bond");
+    refuse(
+        type,
+        "exclude = \"bonded\" leaves out bonded pairs, but there are no bonds; leave it out, or add a harmonic-bond or "
+        "a [[step]] with 'pairs', 'chain' or 'within'");
   PairFilter filter;
   if (species) filter.species = {&context.particles.species, (*species)[0], (*species)[1]};
   if (exclude) filter.excluded = context.bonds, filter.id = &context.particles.id;

@@ -16,7 +16,7 @@ namespace carom {
 /// The core of a pair or one of its steps (../../laws/steps.h).
 struct ScanSurface {
   double distance, squared;
-  double margin;  ///< of squared distances: nearer to the surface, the side of a pair may not follow from its distance
+  double margin;  ///< a pair whose squared distance is nearer to `squared` than this may be on either side
 };
 
 /// The constants of all scans of one core. Each record has 8 doubles (record.h).
@@ -42,8 +42,8 @@ struct ScanResult {
 
 /// What scan_steps finds.
 struct StepScan {
-  ScanResult first;    ///< of the candidates that are not near a surface
-  std::uint64_t near;  ///< the others, as bits: test each
+  ScanResult first;    ///< the first event with a candidate that is not near a surface
+  std::uint64_t near;  ///< bit q is set if candidate q is near a surface and must be tested alone
 };
 
 /// The most candidates that a kernel scans together: lists are padded to a multiple.

@@ -6,14 +6,7 @@
 namespace carom {
 template <>
 const ScanKernels& kernels_of<ScanKernels, 8>() {
-  static constexpr ScanKernels kernels{{scan<2, 4>, scan<3, 4>},
-                                       {scan_two<2, 4>, scan_two<3, 4>},
-                                       {scan_steps<2, 4>, scan_steps<3, 4>},
-                                       near,
-                                       compare,
-                                       heads,
-                                       {search<2, 4>, search<3, 4>},
-                                       {crossing<2>, crossing<3>}};
+  static constexpr ScanKernels kernels = scan_kernels_of<4>();
   return kernels;
 }
 }  // namespace carom

@@ -43,8 +43,8 @@ inline double smallest(Double<W> x) {
 }
 
 /// The formulas of next_step_time() in step_event.h: the time until pairs reach their cores or steps; ∞ or NaN: never.
-/// Sets `near` for pairs within the margin of a surface. The three forms of a root there have equal parts here: a sum
-/// of two positive numbers, and the squared distance from the surface.
+/// Sets `near` for pairs within the margin of a surface. With R the distance of the surface and Δ the
+/// discriminant, a root is |d² − R²|/(√Δ + |b|) or, if the pair first misses the inner surface, (√Δ + |b|)/v².
 template <class V>
 CAROM_INLINE V step_times(const ScanSetting& s, V b, V d_squared, V v_squared, V cross, IntegerOf<V>& near) {
   const V none = all<V>(__builtin_inf());
@@ -65,12 +65,16 @@ CAROM_INLINE V step_times(const ScanSetting& s, V b, V d_squared, V v_squared, V
   return (turns ? sum : elementary::abs(d_squared - distance * distance)) / (turns ? v_squared : sum);
 }
 
-enum class Pairs { plain, general, stepped };  // ScanSetting::plain; plain with ScanSetting::surfaces
+enum class Pairs {
+  plain,    // with ScanSetting::plain
+  general,  // without
+  stepped   // plain ones with ScanSetting::surfaces
+};
 
 /// Writes the times of contact with n ≤ kScanBlock candidates, of which the first `same` are in the same box: ∞ or NaN
 /// for no contact; −∞ if the two overlap and approach, or are within the margin of a surface. Returns the smallest time
-/// in each lane, without those within a margin. `fresh`: the candidates have just been written by stores that overlap,
-/// so that loading several at once is slow.
+/// in each lane; pairs within a margin do not count. `fresh`: the candidates have just been written by stores that
+/// overlap, so that loading several at once is slow.
 template <int D, int W, bool latest, Pairs pairs, bool fresh = false>
 inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting& s, std::uint32_t self,
                                                               const std::uint32_t* candidates, unsigned n,
@@ -465,6 +469,19 @@ Crossing crossing(const CellFaces& faces, const double* record, const std::int32
   const double first = smallest<4>(after);
   const auto axis = static_cast<unsigned>(__builtin_ctz(bits(after == first)));
   return {first, 2 * axis + (~bits(down) >> axis & 1)};
+}
+
+/// The kernels that look at W candidates at once.
+template <int W>
+constexpr ScanKernels scan_kernels_of() {
+  return {{scan<2, W>, scan<3, W>},
+          {scan_two<2, W>, scan_two<3, W>},
+          {scan_steps<2, W>, scan_steps<3, W>},
+          near,
+          compare,
+          heads,
+          {search<2, W>, search<3, W>},
+          {crossing<2>, crossing<3>}};
 }
 
 }  // namespace

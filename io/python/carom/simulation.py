@@ -292,7 +292,7 @@ class Simulation:
 
     def add_step(self, *between, **parameters):
         """Makes the energy of pairs jump at distances: wells and shoulders between two species ("*" stands for all), or, by `pairs`,
-        `chain` or `within`, bonds between listed particles.
+        `chain` or `within`, bonds of particles.
 
         Parameters are those of [[step]] in decks, which carom.describe("step") lists.
 

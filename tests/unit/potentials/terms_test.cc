@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "engine/forces/forces.h"
+#include "tests/support/experiments.h"
 #include "tests/unit/potentials/cases.h"
 
 namespace carom::terms_test {
@@ -284,6 +286,27 @@ TYPED_TEST(InDimension, OnlyTheUniformFieldAcceleratesEverybodyAlike) {
     for (std::size_t i = 0; i < f.size(); ++i)
       EXPECT_LE((f[i] - scene.particles.mass[i] * *acceleration).norm(), 1e-15);
   });
+}
+
+/// Changes fill the sums after some hundred of them. The renewal does not count, because it depends on the lists.
+TEST(MeanForces, CountTheSamePairsHoweverManyChangesThereHaveBeen) {
+  const auto system = test::hard_spheres<3>(4, 0.3);
+  test::add_interaction(*system, "lennard-jones", {{"epsilon", 1.0}, {"sigma", 1.0}, {"cutoff", 2.5}});
+  const auto& x = system->particles.x;
+  MeanForces<3> forces;
+  forces.evaluate(*system, x, x);
+  std::vector<char> changed(x.size(), 0);
+  changed[0] = 1;
+  auto near = x, far = x;
+  far[0][0] += 0.3;
+  const std::uint64_t pairs = forces.update(*system, x, near, far, changed.data());
+  for (int k = 0; k < 1000; ++k) {
+    ASSERT_EQ(forces.update(*system, x, far, near, changed.data()), pairs) << k;
+    ASSERT_EQ(forces.update(*system, x, near, far, changed.data()), pairs) << k;
+  }
+  MeanForces<3> afresh;
+  afresh.evaluate(*system, x, far);
+  for (Id i = 0; i < x.size(); ++i) EXPECT_EQ(forces[i], afresh[i]);
 }
 
 }  // namespace
