@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How the relaxation time of a freely jointed chain in a bath grows with the number of its beads, without and with excluded volume.
 
-    tools/python tools/chain_relaxation.py                                               # a quarter of an hour
+    tools/python tools/chain_relaxation.py                                               # 20 minutes
     tools/python tools/chain_relaxation.py --beads 4,8,16 --times 60                       # half a minute
 
 The distance of neighbours is between 1 and 1.2. Beads are points that pass through each other, or spheres of diameter 1. Each chain is

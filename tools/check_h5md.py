@@ -185,8 +185,11 @@ class Checker:
                 if (value := group.get(f"{name}/value")) is not None and value.shape == group["position/value"].shape:
                     self.expect(not np.any(value[:, :, 2]), f"a 2-D run: {name} along z must be 0")
         edges = group["box/edges/value"][:]
-        self.expect(np.array_equal(edges, edges * np.eye(3)) and np.all(edges.diagonal(axis1=1, axis2=2) > 0),
-                    "edges: must be a diagonal matrix of positive lengths")
+        allowed = np.eye(3)
+        allowed[1, 0] = 1   # the tilt of a sheared box
+        self.expect(np.array_equal(edges, edges * allowed) and np.all(edges.diagonal(axis1=1, axis2=2) > 0),
+                    "edges: must be a matrix of positive lengths on the diagonal and nothing else but the tilt of the second edge along x")
+        self.expect(np.all(edges[:, 1, 0] >= 0) and np.all(edges[:, 1, 0] < edges[:, 0, 0]), "edges: the tilt must be in [0, edge)")
         for axis in [axis for axis, rule in enumerate(boundary) if rule == "periodic"]:
             x = group["position/value"][:, :, axis]
             self.expect(np.all(x >= 0) and np.all(x < edges[:, axis, axis, None]),

@@ -186,8 +186,8 @@ void EventCore<D>::collide_pair(Slot i, Slot j, std::uint32_t partner, double ti
                                 const Report& report) {
   const Packing<D>& packing = flights_.packing();
   if (report.trace) begin_trace(i, partner, generation, *report.trace);
-  const Vec<D> shift = packing.linear(partner) != 0 ? box_.shift(packing.image(partner)) : Vec<D>(Vec<D>::Zero());
-  const EventResult<D> result = flights_.collide(i, j, shift, time, generation);
+  const Offset<D> offset = packing.linear(partner) != 0 ? box_.offset(packing.image(partner)) : Offset<D>{};
+  const EventResult<D> result = flights_.collide(i, j, offset, time, generation);
   ++queue_[i].version;
   ++queue_[j].version;
   if (report.trace) return report.trace->end(flights_[i], flights_[j], result.exchange, result.overlap);
@@ -196,7 +196,7 @@ void EventCore<D>::collide_pair(Slot i, Slot j, std::uint32_t partner, double ti
     return pair_key<D>(time, generation, flights_[i].id, flights_[j].id, packing.image(partner));
   };
   report.counters.note_overlap(result.overlap, [&] { return Overlap(result.overlap, result.sigma, key()); });
-  if (report.contacts) report.contacts->push_back(flights_.contact_of(key(), flights_[i], flights_[j], shift, result));
+  if (report.contacts) report.contacts->push_back(flights_.contact_of(key(), flights_[i], flights_[j], offset, result));
 }
 
 template <int D>

@@ -18,7 +18,7 @@ void EventSearch<D>::start(double now, double max_displacement) {
   max_displacement_ = max_displacement;
   setting_ = flights_.setting();
   std::vector<double> reaches = flights_.reaches(flights_.horizon());
-  if (lists_ && reaches_ == reaches) {  // lists are reused in the next slab if the reaches are unchanged
+  if (lists_ && reaches_ == reaches && !box_.sheared()) {  // lists are reused if the reaches are unchanged
     lists_->follow(flights_.records());
   } else {
     clear();
@@ -41,6 +41,7 @@ void EventSearch<D>::choose(double now) {
   // The density is that of the whole system: a subdomain has a part of it, perhaps no spheres yet, and may receive
   // larger ones.
   const std::vector<double>& radii = flights_.size() == 0 && sizes_ ? sizes_->radius : reaches_;
+  if (box_.sheared()) options_.method = SearchOptions::Method::lists;  // cells would slide
   if (counts_.predictions == 0) tuning_ = SearchTuning(options_);
   Extent<D> extent = flights_.extent();
   if (sizes_) {
@@ -65,10 +66,15 @@ void EventSearch<D>::choose(double now) {
   double skin = tuning_.skin();
   for (int k = 0; k < D; ++k)
     if (box_.periodic(k)) skin = std::min(skin, 0.2 * box_.edges[k]);  // below half a box: images stay distinct
-  lists_ = std::make_unique<SkinLists<D>>(box_, flights_.packing(), kernels_, reaches_, flights_.equal(), largest_,
+  const auto flow = FlowFrame::between(box_.shear_rate, now, flights_.horizon());
+  Box<D> box = box_;
+  box.tilt += box_.slide() * flow.time;  // not made shorter: images keep their numbers
+  lists_ = std::make_unique<SkinLists<D>>(box, flow, flights_.packing(), kernels_, reaches_, flights_.equal(), largest_,
                                           skin, queue_.plans());
+  // In a window of a subdomain spheres also move relative to the centre of a region that is elsewhere in the flow.
+  if (box_.sheared() && max_displacement_ > 0) max_displacement_ += kStrainOfWindow * (skin + max_displacement_);
   lists_->build(
-      flights_.size(), [&](Slot i) { return flights_.at(i, now).x; }, extent, max_displacement_);
+      flights_.size(), [&](Slot i) { return place(i, now); }, extent, max_displacement_);
 }
 
 /// The list of a sphere as input of the kernels.
@@ -175,7 +181,7 @@ void EventSearch<D>::offer(const ScanTask& task, unsigned q) {
   const std::uint32_t candidate = task.candidates[q];
   const Slot j = flights_.packing().slot(candidate);
   if (j == task.self) return;
-  const double time = flights_.pair_contact(task.self, j, box_.shift(flights_.packing().image(candidate)));
+  const double time = flights_.pair_contact(task.self, j, box_.offset(flights_.packing().image(candidate)));
   if (time <= queue_[task.self].contact && time < kNever) queue_.offer(task.self, time, EventKind::pair, candidate);
 }
 
@@ -194,7 +200,7 @@ void EventSearch<D>::foresee_lone_events(Slot i) {
 template <int D>
 void EventSearch<D>::foresee_update(Slot i, double now) {
   if (lists_)
-    predict_leaving(queue_[i], flights_[i], flights_, distance_left(i), now);
+    predict_leaving(queue_[i], flights_[i], flights_, lists_->flow(), distance_left(i), now);
   else
     predict_crossing(queue_[i], i, flights_, box_, *cells_, now);
 }
@@ -220,8 +226,9 @@ void EventSearch<D>::renew_list(Slot i, double now) {
   const auto way = [&](const Vec<D>& x) {  // distance from the centre of its list's region
     return (x - Eigen::Map<const Vec<D>>(a.where.centre)).norm();
   };
-  if (const Vec<D> x = flights_.at(i, now).x; !flights_.field() || way(x) >= 0.7 * distance_left(i)) {
+  if (const Vec<D> x = place(i, now); !flights_.field() || way(x) >= 0.7 * distance_left(i)) {
     ++counts_.rebuilds;
+    if (box_.sheared()) lists_->pass(now, max_displacement_ > 0 ? kStrainOfWindow : 0);
     const std::span<const std::uint32_t> fresh = lists_->renew(i, x);
     if (!fresh.empty()) scan({i, fresh.data(), static_cast<unsigned>(fresh.size()), 0}, false);
   }  // else its list is still valid far enough
@@ -249,11 +256,10 @@ void EventSearch<D>::admit(Slot i, double reach, double now) {
   }
   setting_ = flights_.setting();
   if (!at_border_.empty()) at_border_[i] = border_fits() ? 1 : 0;
-  const Vec<D> x = flights_.at(i, now).x;
   if (lists_) {
-    lists_->admit(i, x, reaches_);
+    lists_->admit(i, place(i, now), reaches_);
   } else {
-    queue_[i].where.cell = cells_->place(x);
+    queue_[i].where.cell = cells_->place(flights_.at(i, now).x);
     cells_->admit(i, queue_[i].where.cell);
   }
   plan(i, now);
@@ -269,13 +275,12 @@ void EventSearch<D>::dismiss(Slot i) {
 
 template <int D>
 void EventSearch<D>::move(Slot i, double now) {
-  const Vec<D> x = flights_.at(i, now).x;
   if (lists_) {
-    lists_->move(i, x, distance_left(i));
+    lists_->move(i, place(i, now), distance_left(i), now);
   } else {
     CellPlace<D>& cell = queue_[i].where.cell;
     cells_->remove(i, cell);
-    cell = cells_->place(x);
+    cell = cells_->place(flights_.at(i, now).x);
     cells_->admit(i, cell);
   }
 }
@@ -287,7 +292,7 @@ void EventSearch<D>::set_border(std::span<const Slot> slots, double now) {
   for (const Slot i : slots) {
     at_border_[i] = 1;
     if (!before.empty() && before[i] != 0) continue;  // it has stayed near the centre of its region
-    if (lists_->move(i, flights_.at(i, now).x, distance_left(i))) {
+    if (lists_->move(i, place(i, now), distance_left(i), now)) {
       plan(i, now);
       queue_.read_versions();
     } else {

@@ -94,6 +94,11 @@ class EventSearch {
   [[gnu::noinline]] void cross(Slot i, double now);
   [[gnu::noinline]] void renew_list(Slot i, double now);
   double distance_left(Slot i) const;
+  /// The place of a sphere as the lists take it.
+  Vec<D> place(Slot i, double now) const {
+    const Vec<D> x = flights_.at(i, now).x;
+    return lists_->flow().coordinates(x, now);
+  }
   /// Whether the skin leaves room for another `max_displacement` at the border.
   bool border_fits() const { return lists_ && lists_->skin() >= 3 * max_displacement_; }
 

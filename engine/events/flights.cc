@@ -56,13 +56,14 @@ void Flights<D>::set_surroundings() {
   walls_ = box_.walls();
   kicks_ = box_.bath.kicks();
   lone_events_ = kicks_ || !walls_.empty();
+  sheared_ = box_.sheared();
 }
 
 /// The kernels know steps that all pairs have at the same distances, on straight flights.
 template <int D>
 void Flights<D>::set_surfaces() {
   surfaces_.clear();
-  const PairSteps* const steps = has_steps_ && equal() && !field_ ? box_.steps.of_all() : nullptr;
+  const PairSteps* const steps = has_steps_ && equal() && !field_ && !sheared_ ? box_.steps.of_all() : nullptr;
   if (!steps) return;
   const double sigma = common_radius_ + common_radius_, widest = std::max(kJustMet * sigma, gap_tolerance_(0));
   const auto add = [&](double distance) {  // with twice the margin of any pair in next_step_time()
@@ -96,7 +97,11 @@ ScanSetting Flights<D>::setting() const {
                       .slot_mask = packing_.slot_mask,
                       .slot_bits = packing_.slot_bits,
                       .field_bits = packing_.field_bits,
-                      .plain = radius_.empty() && !field_ && growth_ == 0,
+                      .plain = radius_.empty() && !field_ && growth_ == 0 && !sheared_,
+                      .sheared = radius_.empty() && !field_ && growth_ == 0 && sheared_,
+                      .slides = sheared_,
+                      .tilt = sheared_ ? box_.tilt : 0,
+                      .slide = sheared_ ? box_.slide() : 0,
                       .surfaces = surfaces_.empty() ? nullptr : surfaces_.data(),
                       .surface_count = static_cast<unsigned>(surfaces_.size())};
   for (int k = 0; k < D; ++k) {
@@ -147,7 +152,7 @@ void Flights<D>::admit(Slot i, const Record<D>& r, double radius, double mass, c
 }
 
 template <int D>
-double Flights<D>::pair_contact(Slot i, const Record<D>& a, Slot j, const Record<D>& b, const Vec<D>& shift) const {
+double Flights<D>::pair_contact(Slot i, const Record<D>& a, Slot j, const Record<D>& b, const Offset<D>& offset) const {
   const double now = std::max(a.t, b.t);
   const double s_a = now - a.t, s_b = now - b.t;
   Vec<D> d = (a.x + s_a * a.v) - (b.x + s_b * b.v);
@@ -156,14 +161,18 @@ double Flights<D>::pair_contact(Slot i, const Record<D>& a, Slot j, const Record
     d += (0.5 * (s_a * s_a - s_b * s_b)) * g_;
     v += (s_a - s_b) * g_;
   }
-  d += shift;
+  d += offset.start;
+  if (sheared_) [[unlikely]] {
+    d[0] += offset.slide * now;
+    v[0] += offset.slide;
+  }
   const double radii = radius(i) + radius(j), sigma = grown(radii, now), rate = radii * growth_;
   if (const PairSteps* const steps = steps_of(a, b)) [[unlikely]]
     return now + next_step_time<D>(*steps, d, v, sigma,
                                    side_tolerance(just_met(a, b), a.t == 0 && b.t == 0, sigma, gap_tolerance_(0)),
                                    [&] { return approach_slack(sigma, a.v.norm(), b.v.norm()); });
   const bool apart = d.squaredNorm() > sigma * sigma;
-  const double slack = apart ? 0 : approach_slack(sigma, a.v.norm(), b.v.norm() + rate);
+  const double slack = apart ? 0 : approach_slack(sigma, a.v.norm(), b.v.norm() + rate + std::abs(offset.slide));
   return now + contact_time<D>(d, v, sigma, rate, slack);
 }
 
@@ -191,14 +200,14 @@ template <int D>
 template <bool kInternal>
 [[gnu::always_inline]] inline EventResult<D> Flights<D>::collide_with(Slot i, Record<D>& a, Internal<D>* in_a, Slot j,
                                                                       Record<D>& b, Internal<D>* in_b,
-                                                                      const Vec<D>& shift, double t,
+                                                                      const Offset<D>& offset, double t,
                                                                       std::uint32_t generation) const {
   advance(a, t);
   advance(b, t);
-  const Vec<D> d = a.x - b.x + shift;
+  const Vec<D> d = separation(a, b, offset);
   const double radii = radius(i) + radius(j), sigma = grown(radii, t);
   const Partner<D> of_a{mass(i), radius(i), a.species, in_a}, of_b{mass(j), radius(j), b.species, in_b};
-  const Vec<D> v = a.v - b.v;
+  const Vec<D> v = relative_velocity(a, b, offset);
   const double w = radii * growth_;
   const PairImpulse<D> met = kInternal ? pair_impulse<D>(laws(), d, v, of_a, of_b, sigma, w)
                                        : normal_impulse<D>(laws(), d, v, of_a, of_b, sigma, w);
@@ -211,28 +220,32 @@ template <bool kInternal>
     b.v -= impulse / of_b.mass;
   }
   a.generation = b.generation = static_cast<std::uint16_t>(generation);
-  return {d, impulse, {.virial = d.dot(impulse), .dissipated = met.dissipated}, 1 - d.norm() / sigma, sigma};
+  EventResult<D> result{
+      d, impulse, {.virial = d.dot(impulse), .dissipated = met.dissipated}, 1 - d.norm() / sigma, sigma};
+  if (sheared_) [[unlikely]]
+    result.exchange.shear = -offset.slide * impulse[0];
+  return result;
 }
 
 template <int D>
-EventResult<D> Flights<D>::collide_smooth(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
+EventResult<D> Flights<D>::collide_smooth(Slot i, Record<D>& a, Slot j, Record<D>& b, const Offset<D>& offset, double t,
                                           std::uint32_t generation) const {
-  return collide_with<false>(i, a, nullptr, j, b, nullptr, shift, t, generation);
+  return collide_with<false>(i, a, nullptr, j, b, nullptr, offset, t, generation);
 }
 
 template <int D>
 EventResult<D> Flights<D>::collide(Slot i, Record<D>& a, Internal<D>& in_a, Slot j, Record<D>& b, Internal<D>& in_b,
-                                   const Vec<D>& shift, double t, std::uint32_t generation) const {
+                                   const Offset<D>& offset, double t, std::uint32_t generation) const {
   const PairSteps* const steps = steps_of(a, b);
   if (steps) [[unlikely]] {
     advance(a, t);
     advance(b, t);
-    const Vec<D> d = a.x - b.x + shift;
+    const Vec<D> d = separation(a, b, offset);
     if (const StepSurface* const step = step_at(*steps, d.norm(), contact_distance(i, j)))
       return meet_step(*step, i, a, j, b, d, generation);
   }
-  EventResult<D> result = has_internal_ ? collide_with<true>(i, a, &in_a, j, b, &in_b, shift, t, generation)
-                                        : collide_smooth(i, a, j, b, shift, t, generation);
+  EventResult<D> result = has_internal_ ? collide_with<true>(i, a, &in_a, j, b, &in_b, offset, t, generation)
+                                        : collide_smooth(i, a, j, b, offset, t, generation);
   if (steps) [[unlikely]] {
     result.sigma = steps->core_distance(result.sigma);
     result.overlap = 1 - result.d.norm() / result.sigma;
@@ -269,33 +282,41 @@ EventResult<D> Flights<D>::meet_alone(const EventKey<D>& key, Slot i, Record<D>&
   const Draw draw{.id = r.id, .time = box_.time + t, .number = key.generation};
   advance(r, t);
   r.generation = static_cast<std::uint16_t>(key.generation);
-  const Vec<D> before = r.v;
+  const Vec<D> flow = this->flow(r), before = r.v - flow;
+  const auto shear = [&](const Vec<D>& impulse) { return flow[0] * impulse[0]; };
   if (key.kind == EventKind::kick) {
-    r.v = kicked_velocity<D>(box_.bath, m, draw);
-    const double heat = 0.5 * m * (r.v.squaredNorm() - before.squaredNorm());
-    return {Vec<D>::Zero(), m * (r.v - before), {.heat = heat}, 0, at_contact};
+    const Vec<D> after = kicked_velocity<D>(box_.bath, m, draw), impulse = m * (after - before);
+    r.v = after;
+    if (sheared_) r.v += flow;
+    const double heat = 0.5 * m * (after.squaredNorm() - before.squaredNorm());
+    return {Vec<D>::Zero(), impulse, {.heat = heat, .shear = shear(impulse)}, 0, at_contact};
   }
   const Wall<D> wall = box_.wall(key.hi);
-  const auto [after, impulse, exchange] =
+  auto [after, impulse, exchange] =
       wall_impulse<D>(laws(), wall.at(r.x), before, {m, at_contact, r.species, has_internal_ ? internal : nullptr},
                       draw, t, radius(i) * growth_);
   r.v = after;
+  if (sheared_) r.v += flow;
+  exchange.shear = shear(impulse);
   return {r.x - wall.foot(r.x, t), impulse, exchange, -wall.gap(r.x, at_contact, t) / at_contact, at_contact};
 }
 
 template <int D>
-Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
-                                  const EventResult<D>& result) const {
+Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b,
+                                  const Offset<D>& offset, const EventResult<D>& result) const {
   const auto& [d, impulse, exchange, overlap, sigma] = result;
-  if (a.id < b.id) return {key, a.x, b.x - shift, impulse, exchange, overlap, sigma, a.v, b.v};
-  return {key, b.x, a.x + shift, -impulse, exchange, overlap, sigma, b.v, a.v};
+  Vec<D> shift = offset.start;
+  shift[0] += offset.slide * key.time;
+  const Vec<D> v_a = a.v - flow(a), v_b = b.v - flow(b);
+  if (a.id < b.id) return {key, a.x, b.x - shift, impulse, exchange, overlap, sigma, v_a, v_b};
+  return {key, b.x, a.x + shift, -impulse, exchange, overlap, sigma, v_b, v_a};
 }
 
 template <int D>
 Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& r, const EventResult<D>& result) const {
   const auto& [d, impulse, exchange, overlap, sigma] = result;
   const Vec<D> touched = key.kind == EventKind::wall ? box_.wall(key.hi).foot(r.x, key.time) : r.x;
-  return {key, r.x, touched, impulse, exchange, overlap, sigma, r.v};
+  return {key, r.x, touched, impulse, exchange, overlap, sigma, r.v - flow(r)};
 }
 
 template class Flights<2>;

@@ -72,6 +72,10 @@ class Flights {
     for (Slot i = 0; i < size(); ++i) places.push_back(at(i, t).x);
     return places;
   }
+  /// The speed in a record relative to the flow.
+  double speed(const Record<D>& r) const { return sheared_ ? (r.v - flow(r)).norm() : r.v.norm(); }
+  bool sheared() const { return sheared_; }
+  double shear_rate() const { return box_.shear_rate; }
   /// The extent of the positions in the records.
   Extent<D> extent() const;
   /// The settings for the kernels of scan.h.
@@ -87,26 +91,26 @@ class Flights {
   static std::uint32_t generation_at(const Record<D>& r, double t) { return r.t == t ? r.generation + 1u : 0u; }
   std::uint32_t generation_at(Slot i, double t) const { return generation_at(records_[i], t); }
 
-  /// The time at which two spheres next touch or reach a step, with `shift` added to x_i − x_j; infinite if never.
+  /// The time at which two spheres next touch or reach a step, with `offset` added to x_i − x_j; infinite if never.
   /// Exchanging the two gives the same bits, because every difference only changes its sign.
-  double pair_contact(Slot i, Slot j, const Vec<D>& shift) const {
-    return pair_contact(i, records_[i], j, records_[j], shift);
+  double pair_contact(Slot i, Slot j, const Offset<D>& offset) const {
+    return pair_contact(i, records_[i], j, records_[j], offset);
   }
 
   /// Executes the event of two spheres at time t: a collision of their cores, or an event at a step.
-  EventResult<D> collide(Slot i, Slot j, const Vec<D>& shift, double t, std::uint32_t generation) {
+  EventResult<D> collide(Slot i, Slot j, const Offset<D>& offset, double t, std::uint32_t generation) {
     if (has_internal_) [[unlikely]]
-      return collide(i, records_[i], internal_[i], j, records_[j], internal_[j], shift, t, generation);
+      return collide(i, records_[i], internal_[i], j, records_[j], internal_[j], offset, t, generation);
     if (has_steps_) [[unlikely]] {
       Internal<D> none[2];
-      return collide(i, records_[i], none[0], j, records_[j], none[1], shift, t, generation);
+      return collide(i, records_[i], none[0], j, records_[j], none[1], offset, t, generation);
     }
-    return collide_smooth(i, records_[i], j, records_[j], shift, t, generation);
+    return collide_smooth(i, records_[i], j, records_[j], offset, t, generation);
   }
 
   // The functions above for records other than the present ones. Internal states change; they are not read if spheres
   // have none.
-  double pair_contact(Slot i, const Record<D>& a, Slot j, const Record<D>& b, const Vec<D>& shift) const;
+  double pair_contact(Slot i, const Record<D>& a, Slot j, const Record<D>& b, const Offset<D>& offset) const;
   /// Whether the last event of both was one with each other, perhaps.
   static bool just_met(const Record<D>& a, const Record<D>& b) {
     return a.t == b.t && a.generation == b.generation && a.t != 0;
@@ -116,7 +120,7 @@ class Flights {
     return has_steps_ ? box_.steps.find(a.id, a.species, b.id, b.species) : nullptr;
   }
   EventResult<D> collide(Slot i, Record<D>& a, Internal<D>& in_a, Slot j, Record<D>& b, Internal<D>& in_b,
-                         const Vec<D>& shift, double t, std::uint32_t generation) const;
+                         const Offset<D>& offset, double t, std::uint32_t generation) const;
 
   void set(Slot i, const Record<D>& r, const Internal<D>& internal) {
     records_[i] = r;
@@ -125,8 +129,9 @@ class Flights {
   /// Stores a sphere in slot `i`, an existing one or the next.
   void admit(Slot i, const Record<D>& r, double radius, double mass, const Internal<D>& internal);
 
-  /// The contact reported to observers after a collision of two spheres, or after a lone event.
-  Contact<D> contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Vec<D>& shift,
+  /// The contact reported to observers after a collision of two spheres, or after a lone event. Under shear its
+  /// velocities are relative to the flow.
+  Contact<D> contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b, const Offset<D>& offset,
                         const EventResult<D>& result) const;
   Contact<D> contact_of(const EventKey<D>& key, const Record<D>& r, const EventResult<D>& result) const;
 
@@ -155,11 +160,30 @@ class Flights {
   /// Spheres without an internal state pay nothing for it.
   template <bool kInternal>
   EventResult<D> collide_with(Slot i, Record<D>& a, Internal<D>* in_a, Slot j, Record<D>& b, Internal<D>* in_b,
-                              const Vec<D>& shift, double t, std::uint32_t generation) const;
-  EventResult<D> collide_smooth(Slot i, Record<D>& a, Slot j, Record<D>& b, const Vec<D>& shift, double t,
+                              const Offset<D>& offset, double t, std::uint32_t generation) const;
+  EventResult<D> collide_smooth(Slot i, Record<D>& a, Slot j, Record<D>& b, const Offset<D>& offset, double t,
                                 std::uint32_t generation) const;
   [[gnu::noinline]] EventResult<D> meet_step(const StepSurface& step, Slot i, Record<D>& a, Slot j, Record<D>& b,
                                              const Vec<D>& d, std::uint32_t generation) const;
+  /// The separation of two spheres at the time of their records, with the image.
+  Vec<D> separation(const Record<D>& a, const Record<D>& b, const Offset<D>& offset) const {
+    Vec<D> d = a.x - b.x + offset.start;
+    if (sheared_) [[unlikely]]
+      d[0] += offset.slide * a.t;
+    return d;
+  }
+  Vec<D> relative_velocity(const Record<D>& a, const Record<D>& b, const Offset<D>& offset) const {
+    Vec<D> v = a.v - b.v;
+    if (sheared_) [[unlikely]]
+      v[0] += offset.slide;
+    return v;
+  }
+  /// The velocity of the flow at the place of a sphere; zero without shear.
+  Vec<D> flow(const Record<D>& r) const {
+    Vec<D> flow = Vec<D>::Zero();
+    if (sheared_) flow[0] = box_.flow(r.x);
+    return flow;
+  }
   void set_surroundings();
   void set_surfaces();
   /// The time at which a sphere touches a wall. Throws Error(Failure::numerical) if it rests there under the field.
@@ -185,7 +209,8 @@ class Flights {
   ContactLaws elastic_;
   std::vector<Wall<D>> walls_;
   Vec<D> g_ = Vec<D>::Zero();
-  bool field_ = false, has_internal_ = false, has_steps_ = false, kicks_ = false, lone_events_ = false;
+  bool field_ = false, has_internal_ = false, has_steps_ = false, kicks_ = false, lone_events_ = false,
+       sheared_ = false;
   double growth_ = 0, horizon_ = 0;
   GapTolerance gap_tolerance_;
   PageVector<Record<D>> records_;  // by slot

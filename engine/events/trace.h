@@ -2,7 +2,7 @@
 #pragma once
 // The log of a window that the event core writes: enough to revoke any event and to read the path of any sphere.
 //
-// The log is in the order of keys and costs 184 bytes an event. Paths are read from it only for the
+// The log is in the order of keys and costs 192 bytes an event. Paths are read from it only for the
 // few spheres near the border of a subdomain (engine/ranks/window_paths.h).
 
 #include <algorithm>
@@ -61,8 +61,10 @@ class Trace {
   };
   // Sphere k of an event, k = 0 or 1, has the entry number 2·event + k.
 
-  /// Removes all events and makes room for this many slots.
-  void clear(std::size_t slots) {
+  /// Removes all events and makes room for this many slots. Speeds are relative to a flow along the first axis, whose
+  /// velocity is shear_rate·y.
+  void clear(std::size_t slots, double shear_rate) {
+    shear_rate_ = shear_rate;
     base_ += 2 * static_cast<std::uint32_t>(size_);
     if (base_ > kNoEntry / 4) {
       std::fill(latest_.begin(), latest_.end(), 0);
@@ -100,10 +102,15 @@ class Trace {
     event.exchange = {event.kind, exchange};
     event.pair_event = exchange.event;
     event.overlap = overlap;
-    fastest_squared_ = std::max({fastest_squared_, a.v.squaredNorm(), b.v.squaredNorm()});
+    note_speed(a);
+    note_speed(b);
   }
   /// Call for a sphere after an event that is not in the log.
-  void note_speed(const Record<D>& r) { fastest_squared_ = std::max(fastest_squared_, r.v.squaredNorm()); }
+  void note_speed(const Record<D>& r) {
+    Vec<D> v = r.v;
+    v[0] -= shear_rate_ * r.x[1];
+    fastest_squared_ = std::max(fastest_squared_, v.squaredNorm());
+  }
 
   /// Links the entries of each sphere, which the functions below require; calls visit(slot, first) at each and, some
   /// events earlier, prefetch(slot). In one pass over the complete log the memory of many spheres is fetched at once;
@@ -162,7 +169,7 @@ class Trace {
   std::vector<std::uint32_t> latest_;         // by slot: base_ + entry; smaller values are from earlier windows
   std::uint32_t base_ = 1;
   std::size_t size_ = 0, most_ = 0;
-  double fastest_squared_ = 0;
+  double fastest_squared_ = 0, shear_rate_ = 0;
   mutable std::vector<std::uint32_t> entries_;
 };
 

@@ -89,6 +89,7 @@ struct IntegratorInfo {
   bool local = false;         ///< each rank needs only its own particles and nearby ones; false: all particles
   bool shadow = false;        ///< a Verlet type: report the shadow energy S_h
   bool steps = false;         ///< pairs may have steps (laws/steps.h)
+  bool shear = false;         ///< the box may be sheared
   bool adapts = false;        ///< steps may have any lengths: SlabReport::error and StepTooLong choose them
   /// Contacts of a sphere in a slab above which shorter slabs are cheaper; infinite: slabs may have any number.
   double most_contacts = std::numeric_limits<double>::infinity();
@@ -101,6 +102,10 @@ struct IntegratorInfo {
   std::string refusal(const Interaction<D>& term, bool fixed) const;
   /// Why the method cannot run with steps of the pair energy, in the same form; empty if it can.
   std::string refusal_of_steps() const;
+  /// Why the method cannot run with the shear of this system, in the same form; empty if it can, or if there is none.
+  /// `fixed`: whether some particles are fixed.
+  template <int D>
+  std::string refusal_of_shear(const System<D>& system, bool fixed) const;
 
   template <int D>
   std::unique_ptr<Integrator<D>> make(const Parameters& p) const {

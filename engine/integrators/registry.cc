@@ -2,6 +2,7 @@
 #include "engine/integrators/registry.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 
 namespace carom {
@@ -34,6 +35,25 @@ std::string IntegratorInfo::refusal_of_steps() const {
   return std::string("'").append(name).append("' does not know steps of the pair energy; take one of: ").append(able);
 }
 
+template <int D>
+std::string IntegratorInfo::refusal_of_shear(const System<D>& system, bool fixed) const {
+  const Box<D>& box = system.box;
+  if (!std::isfinite(box.shear_rate)) return "the rate of 'shear' is not finite; give a number";
+  if (!box.sheared()) return "";
+  if (!shear) return std::string("'").append(name).append("' knows no shear yet; take free-flight, or leave 'shear' out");
+  for (const int k : {0, 1})
+    if (!box.periodic(k))
+      return "'shear' needs an axis " + std::to_string(k) +
+             " that is periodic, because images of the box slide along x and follow each other along y; make it "
+             "periodic, or leave 'shear' out";
+  if (!box.steps.empty()) return "'shear' does not go with [[step]] yet; leave one of them out";
+  if (fixed)
+    return "fixed particles do not move with the flow of 'shear'; let all particles move, or leave 'shear' out";
+  return "";
+}
+
+template std::string IntegratorInfo::refusal_of_shear(const System<2>&, bool) const;
+template std::string IntegratorInfo::refusal_of_shear(const System<3>&, bool) const;
 template std::string IntegratorInfo::refusal(const Interaction<2>&, bool) const;
 template std::string IntegratorInfo::refusal(const Interaction<3>&, bool) const;
 

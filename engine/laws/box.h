@@ -61,6 +61,14 @@ struct WallOptions {
   }
 };
 
+/// Where an image of the box is during a slab: what to add to the separation of two spheres at the start of the slab,
+/// and how fast this changes.
+template <int D>
+struct Offset {
+  Vec<D> start = Vec<D>::Zero();  ///< [length]
+  double slide = 0;               ///< along the first axis; it is not zero under shear only [length/time]
+};
+
 template <int D>
 struct Box {
   Vec<D> edges = Vec<D>::Ones();  ///< at time 0 [length]
@@ -72,6 +80,26 @@ struct Box {
   bool straight = false;            ///< shaken walls move straight over each step
   ContactLaws contacts{};
   Steps steps{};
+  double shear_rate = 0;  ///< of Lees–Edwards boundaries: dv_x/dy of the flow; the images above slide along x [1/time]
+  double tilt = 0;        ///< where the image above is along x at `time`, in [0, edges[0]) [length]
+
+  /// Whether the lattice of images is not that of the edges alone: it slides, or stays tilted after a flow.
+  bool sheared() const { return shear_rate != 0 || tilt != 0; }
+  /// The velocity of the flow along x at a position. Positions along y are unwrapped.
+  double flow(const Vec<D>& x) const { return shear_rate * x[1]; }
+  /// How fast the image above slides [length/time].
+  double slide() const { return shear_rate * edges[1]; }
+  /// Moves on to start + elapsed from the start of a slab, when the tilt was `tilted`. Returns the number of edges by
+  /// which the tilt has been made shorter.
+  std::int32_t pass(double start, double tilted, double elapsed) {
+    time = start + elapsed;
+    if (!sheared()) return 0;
+    tilt = tilted + slide() * elapsed;
+    auto boxes = static_cast<std::int32_t>(std::floor(tilt / edges[0]));
+    tilt -= boxes * edges[0];
+    if (tilt >= edges[0]) tilt = 0, ++boxes;  // a tiny negative value rounds up
+    return boxes;
+  }
 
   bool periodic(int axis) const { return boundary[axis] == Boundary::periodic; }
   bool walled(int axis) const { return boundary[axis] == Boundary::wall; }
@@ -187,21 +215,27 @@ struct Box {
     for (int k = 0; k < D; ++k)
       if (periodic(k) && !(std::abs(d[k]) <= 0.5 * edges[k]))  // else the quotient rounds to zero
         image[k] = -static_cast<std::int32_t>(std::nearbyint(d[k] / edges[k]));
+    if (tilt != 0 && image[1] != 0) image[0] = -static_cast<std::int32_t>(std::nearbyint((d[0] + image[1] * tilt) / edges[0]));
     return image;
   }
 
-  /// The displacement of an image.
+  /// The displacement of an image at `time`.
   Vec<D> shift(const Image<D>& image) const {
     Vec<D> s;
     for (int k = 0; k < D; ++k) s[k] = image[k] == 0 ? 0.0 : image[k] * edges[k];
+    if (tilt != 0 && image[1] != 0) s[0] += image[1] * tilt;
     return s;
+  }
+  /// The displacement and the motion of an image in a slab that starts at `time`.
+  Offset<D> offset(const Image<D>& image) const {
+    return {shift(image), sheared() && image[1] != 0 ? image[1] * slide() : 0};
   }
 
   /// Brings a position back into [0, edge) along the periodic axes and counts the crossings in `image`. Throws
   /// Error(failure) if the number of crossings does not fit into `image`. Positions that are not finite stay.
   void wrap(Vec<D>& x, Image<D>& image, Failure failure = Failure::numerical) const {
     constexpr double kMostCrossings = std::numeric_limits<std::int32_t>::max();
-    for (int k = 0; k < D; ++k) {
+    for (const int k : kAxes) {
       if (!periodic(k) || (x[k] >= 0 && x[k] < edges[k])) continue;
       const double crossings = std::floor(x[k] / edges[k]);
       if (crossings == 0 || !std::isfinite(crossings)) continue;
@@ -211,14 +245,25 @@ struct Box {
                         " times along axis " + std::to_string(k) +
                         "; the numbers of crossings have 32 bits: start it inside the box, enlarge the box, or "
                         "end the run earlier");
+      auto boxes = static_cast<std::int32_t>(crossings);
       x[k] -= crossings * edges[k];
-      image[k] += static_cast<std::int32_t>(crossings);
       if (x[k] >= edges[k]) {  // a tiny negative x rounds up to the edge itself
         x[k] = 0;
-        image[k] += 1;
+        boxes += 1;
       }
+      image[k] += boxes;
+      if (k == 1 && tilt != 0) x[0] -= boxes * tilt;
     }
   }
+
+ private:
+  /// The order of axes in which positions are wrapped: crossing the second axis of a tilted lattice also moves along
+  /// the first.
+  static constexpr std::array<int, D> kAxes = [] {
+    std::array<int, D> axes{1, 0};
+    for (int k = 2; k < D; ++k) axes[k] = k;
+    return axes;
+  }();
 };
 
 }  // namespace carom

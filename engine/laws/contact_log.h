@@ -56,28 +56,30 @@ struct Exchange {
   double heat = 0;                    ///< that the sphere gets from a thermal wall or a bath [energy]
   double dissipated = 0;              ///< energy lost [energy]
   double stored = 0;                  ///< energy that a step takes from the motion [energy]
+  double shear = 0;                   ///< energy that the flow of a sheared box gives, with that of flights [energy]
   PairEvent event = PairEvent::core;  ///< of a pair
 };
 
-/// An exchange in two numbers, for logs of many contacts; `event` is kept beside them.
+/// An exchange in three numbers, for logs of many contacts; `event` is kept beside them.
 struct PackedExchange {
   double first = 0;  ///< the virial of a pair, the impulse of a wall
   double lost = 0;   ///< what is dissipated; where a pair enters or leaves, what is stored; of a thermal wall or a bath
                      ///< the heat, negated
+  double shear = 0;  ///< Exchange::shear
 
   PackedExchange() = default;
   PackedExchange(EventKind kind, const Exchange& all)
-      : first(kind == EventKind::pair ? all.virial : all.impulse), lost(all.dissipated + all.stored - all.heat) {}
+      : first(kind == EventKind::pair ? all.virial : all.impulse), lost(all.dissipated + all.stored - all.heat), shear(all.shear) {}
   /// `number`: that of the wall, if it is one.
   template <int D>
   Exchange unpacked(EventKind kind, PairEvent event, Id number, const Box<D>& box, double time) const {
     if (kind == EventKind::pair) {
       const bool crosses = event == PairEvent::enter || event == PairEvent::leave;
-      return {.virial = first, .dissipated = crosses ? 0 : lost, .stored = crosses ? lost : 0, .event = event};
+      return {.virial = first, .dissipated = crosses ? 0 : lost, .stored = crosses ? lost : 0, .shear = shear, .event = event};
     }
-    if (kind == EventKind::kick) return {.heat = -lost};
+    if (kind == EventKind::kick) return {.heat = -lost, .shear = shear};
     const Wall<D> wall = box.wall(number);
-    Exchange all{.impulse = first, .work = wall.velocity_at(time) * first};
+    Exchange all{.impulse = first, .work = wall.velocity_at(time) * first, .shear = shear};
     (wall.thermal() ? all.heat : all.dissipated) = wall.thermal() ? -lost : lost;
     return all;
   }

@@ -116,12 +116,13 @@ struct ContactTally : OverlapTally {
   ExactSum collision_virial;        ///< Σ d·impulse over pair collisions [mass·length²/time]
   ExactSum dissipated;              ///< energy lost at contacts [energy]
   ExactSum work;                    ///< work done on spheres by moving walls [energy]
+  ExactSum shear;                   ///< energy that the flow of a sheared box gave to the motion relative to it [energy]
   ExactSum heat;                    ///< energy that spheres got from walls and baths with a temperature [energy]
   StepTally steps;                  ///< events of pairs at steps
   std::vector<WallTally> walls;     ///< by number, as far as walls were hit
 
   /// What kinetic and potential energy have lost to the surroundings: H + drained() is conserved.
-  double drained() const { return dissipated.value() - work.value() - heat.value(); }
+  double drained() const { return dissipated.value() - work.value() - shear.value() - heat.value(); }
 
   std::uint64_t contacts() const { return sphere_sphere + steps.events() + sphere_wall; }
   /// The sums of a wall.
@@ -135,6 +136,7 @@ struct ContactTally : OverlapTally {
     if (kind == EventKind::wall) return add_wall(number, exchange);
     ++kicks;
     heat.add(exchange.heat);
+    if (exchange.shear != 0) shear.add(exchange.shear);
   }
   void add_pair(const Exchange& exchange) {
     if (exchange.event == PairEvent::core)
@@ -143,12 +145,16 @@ struct ContactTally : OverlapTally {
       steps.add(exchange);
     collision_virial.add(exchange.virial);
     if (exchange.dissipated != 0) dissipated.add(exchange.dissipated);
+    if (exchange.shear != 0) shear.add(exchange.shear);
   }
   void add_wall(Id number, const Exchange& exchange) {
     ++sphere_wall;
     wall(number).add(exchange);
     for (const auto& [sum, term] :
-         {std::pair{&work, exchange.work}, {&heat, exchange.heat}, {&dissipated, exchange.dissipated}})
+         {std::pair{&work, exchange.work},
+          {&heat, exchange.heat},
+          {&dissipated, exchange.dissipated},
+          {&shear, exchange.shear}})
       if (term != 0) sum->add(term);
   }
   void add(const ContactTally& other) {
@@ -159,13 +165,14 @@ struct ContactTally : OverlapTally {
     collision_virial.add(other.collision_virial);
     dissipated.add(other.dissipated);
     work.add(other.work);
+    shear.add(other.shear);
     heat.add(other.heat);
     steps.add(other.steps);
     for (std::size_t number = other.walls.size(); number-- > 0;) wall(static_cast<Id>(number)).add(other.walls[number]);
   }
   void archive(Archive& archive) {
-    archive(sphere_sphere, sphere_wall, kicks, max_overlap, worst, collision_virial, dissipated, work, heat, steps,
-            walls);
+    archive(sphere_sphere, sphere_wall, kicks, max_overlap, worst, collision_virial, dissipated, work, shear, heat,
+            steps, walls);
   }
   /// Counts a contact and appends it to `log` unless `log` is null.
   template <int D>

@@ -111,7 +111,8 @@ void Bisection<D>::attach(Piece piece, std::vector<Piece>& pieces) {
                                      : !std::isfinite(part.low[k]) && !std::isfinite(part.high[k]);
 }
 
-/// Cuts all pieces across their longest edges at once; returns the pieces to cut further.
+/// Cuts all pieces across their longest edges at once, in a sheared box never across x, so that the images of a
+/// piece stay where they are while they slide; returns the pieces to cut further.
 template <int D>
 auto Bisection<D>::cut(std::span<const Piece> pieces, Communicator& ranks) -> std::vector<Piece> {
   // The extent of the spheres in each piece, used if the box has no edge there, and their work.
@@ -133,12 +134,13 @@ auto Bisection<D>::cut(std::span<const Piece> pieces, Communicator& ranks) -> st
   for (std::size_t p = 0; p < pieces.size(); ++p) {
     const Piece& piece = pieces[p];
     Vec<D> low, high;
-    int axis = 0;
+    int axis = box_.sheared() ? 1 : 0;
     for (int k = 0; k < D; ++k) {
       low[k] = std::isfinite(piece.part.low[k]) ? piece.part.low[k] : -bounds[2 * (p * D + k)];
       high[k] = std::isfinite(piece.part.high[k]) ? piece.part.high[k] : bounds[2 * (p * D + k) + 1];
-      if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
     }
+    for (int k = axis; k < D; ++k)
+      if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
     const std::size_t below = piece.subdomains / 2;
     const double share = static_cast<double>(below) / static_cast<double>(piece.subdomains);
     cuts_.push_back({axis, low[axis] + (high[axis] - low[axis]) * share, 0, 0});

@@ -118,11 +118,17 @@ bool Ownership<D>::meeting_place(const Record<D>& r, double end, Vec<D>& low, Ve
 }
 
 template <int D>
-bool Ownership<D>::may_meet(const Record<D>& r, Slot j, const Vec<D>& shift, double end) const {
+bool Ownership<D>::may_meet(const Record<D>& r, Slot j, const Offset<D>& offset, double end) const {
   const double close = bisection_.reach() + way(r, end);
   const Record<D>& other = core_.flights()[j];
   const double s = end - other.t;
-  const Vec<D> d = r.x - (other.x + s * other.v + (0.5 * s * s) * core_.flights().g()) + shift;
+  if (core_.flights().sheared()) {  // both at the end, because the flow carries them the same way
+    const double wide = (1 + 3 * kStrainOfWindow) * close;
+    Vec<D> d = core_.flights().at(r, end).x - core_.flights().at(other, end).x + offset.start;
+    d[0] += offset.slide * end;
+    return d.squaredNorm() <= wide * wide;
+  }
+  const Vec<D> d = r.x - (other.x + s * other.v + (0.5 * s * s) * core_.flights().g()) + offset.start;
   return d.squaredNorm() <= close * close;
 }
 

@@ -59,7 +59,7 @@ class Ownership {
   bool meeting_place(const Record<D>& r, double end, Vec<D>& low, Vec<D>& high) const;
   /// Whether a sphere with this record can touch sphere j before `end`; j may be up to twice `max_displacement` from
   /// its record.
-  bool may_meet(const Record<D>& r, Slot j, const Vec<D>& shift, double end) const;
+  bool may_meet(const Record<D>& r, Slot j, const Offset<D>& offset, double end) const;
 
  private:
   static constexpr double kWindowsBetweenSearches = 40;  // windows between searches for spheres at the border
@@ -84,14 +84,14 @@ class Ownership {
   void forget(Slot i);
   void watch(double now);
   double update_role(Slot i, double now);
-  /// The largest speed of a sphere until its next event, not 0.
+  /// The largest speed of a sphere until its next event, not 0; under shear, across the flow.
   double speed(Slot i) const {
-    return (1 + 1e-6) * core_.flights()[i].v.norm() + from_field_ + std::numeric_limits<double>::min();
+    return (1 + 1e-6) * core_.flights().speed(core_.flights()[i]) + from_field_ + std::numeric_limits<double>::min();
   }
-  /// The largest distance of a sphere from its record before `end`.
+  /// The largest distance of a sphere from its record before `end`; under shear, across the flow.
   double way(const Record<D>& r, double end) const {
     const double time = end - r.t;
-    return (r.v.norm() + 0.5 * time * core_.flights().g().norm()) * time;
+    return (core_.flights().speed(r) + 0.5 * time * core_.flights().g().norm()) * time;
   }
 
   EventCore<D>& core_;

@@ -34,6 +34,7 @@ struct System {
     fields.add("radius", particles.radius, Kind::constant);
     fields.add("charge", particles.charge, Kind::constant);
     fields.add("species", particles.species, Kind::constant);
+    fields.add_value("tilt", box.tilt);
   }
   System(const System&) = delete;
   System& operator=(const System&) = delete;
@@ -54,10 +55,10 @@ struct System {
   /// Counts the fixed particles. Call when the particles are complete, before they are divided among ranks. Collective.
   void count_moving();
 
-  /// Whether the total momentum is conserved: no walls, no kicks or friction of a bath, no fixed particles, no
+  /// Whether the total momentum is conserved: no walls, no shear, no kicks or friction of a bath, no fixed particles, no
   /// external field.
   bool keeps_momentum() const {
-    return !box.has_walls() && box.bath.keeps_momentum() && !has_fixed() &&
+    return !box.has_walls() && !box.sheared() && box.bath.keeps_momentum() && !has_fixed() &&
            std::ranges::all_of(interactions, [](const auto& term) { return term->keeps_momentum(); });
   }
 

@@ -9,6 +9,7 @@
 #include "engine/base/particles.h"
 #include "engine/base/sizes.h"
 #include "engine/ranks/communicator.h"
+#include "engine/search/flow_frame.h"
 
 namespace carom {
 
@@ -30,7 +31,8 @@ class WindowLength {
   double expected(double length) const { return length > 0 ? each_ * length / pace_ : 0; }
   /// Whether a sphere with this speed after an event may have moved too far in a window of this length.
   bool too_fast(double speed, double length) const {
-    return speed + field_ > fastest_ && (speed + field_) * length > max_displacement_;
+    speed = stretch_ * speed + field_;
+    return speed > fastest_ && speed * length > max_displacement_;
   }
   /// Later windows allow for spheres of this speed; the same on all ranks.
   void allow_for(double speed);
@@ -42,6 +44,8 @@ class WindowLength {
   std::function<double()> forced_;
   double max_displacement_ = 0;
   double field_ = 0;    // speed that the field may add in the epoch
+  double longest_ = 0;  // window in a sheared box; 0: it has no limit
+  double stretch_ = 1;  // by which the flow may lengthen a displacement relative to it in a window
   double fastest_ = 0;  // largest speed expected
   double pace_ = 0;     // estimated time in which a sphere has kCollisionsPerWindow collisions
   double each_ = 0;     // collisions of all spheres in that time

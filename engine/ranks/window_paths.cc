@@ -8,7 +8,7 @@ namespace carom {
 
 template <int D>
 Trace<D>& WindowPaths<D>::start_log() {
-  trace_.clear(flights_.capacity());
+  trace_.clear(flights_.capacity(), flights_.shear_rate());
   return trace_;
 }
 
@@ -157,10 +157,10 @@ Contact<D> WindowPaths<D>::contact_of(Slot lo, std::size_t k) const {
   std::size_t before = 0;
   while (other.node(before + 1).key != key) ++before;
   Node<D> b = other.node(before);
-  const Vec<D> shift = box_.shift(key.image);
+  const Offset<D> offset = box_.offset(key.image);
   const EventResult<D> result =
-      flights_.collide(lo, a.after, a.internal, hi, b.after, b.internal, shift, key.time, key.generation);
-  return flights_.contact_of(key, a.after, b.after, shift, result);
+      flights_.collide(lo, a.after, a.internal, hi, b.after, b.internal, offset, key.time, key.generation);
+  return flights_.contact_of(key, a.after, b.after, offset, result);
 }
 
 template class WindowPaths<2>;

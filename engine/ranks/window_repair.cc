@@ -121,7 +121,7 @@ bool WindowRepair<D>::visit_near(Slot i, const Record<D>& r, Wanted&& wanted, Vi
     const Slot j = flights_.packing().slot(candidate);
     if (!wanted(j)) continue;
     const Image<D> image = flights_.packing().image(candidate);
-    if (ownership_.may_meet(r, j, box_.shift(image), end_)) visit(j, image);
+    if (ownership_.may_meet(r, j, box_.offset(image), end_)) visit(j, image);
   }
   return true;
 }
@@ -156,9 +156,9 @@ void WindowRepair<D>::predict(const Repaired& m, const EventKey<D>& now) {
 template <int D>
 bool WindowRepair<D>::meets(Slot i, const Record<D>& r, Slot j, const Image<D>& image, const EventKey<D>& now,
                             EventKey<D>& key) {
-  const Vec<D> shift = box_.shift(image);
+  const Offset<D> offset = box_.offset(image);
   const auto touches = [&](const Record<D>& other) {
-    const double t = flights_.pair_contact(i, r, j, other, shift);
+    const double t = flights_.pair_contact(i, r, j, other, offset);
     if (!(t < end_)) return false;
     const auto generation = std::max(Flights<D>::generation_at(r, t), Flights<D>::generation_at(other, t));
     key = pair_key<D>(t, generation, r.id, other.id, image);
@@ -191,7 +191,7 @@ void WindowRepair<D>::contact(const Task& task) {
   Repaired& b = repaired_at(task.b, key);
   Node<D> of_b = paths_.path(task.b).back();
   of_b.key = key;
-  flights_.collide(task.a, of_a.after, of_a.internal, task.b, of_b.after, of_b.internal, box_.shift(task.image),
+  flights_.collide(task.a, of_a.after, of_a.internal, task.b, of_b.after, of_b.internal, box_.offset(task.image),
                    key.time, key.generation);
   append(a, of_a);
   append(b, of_b);

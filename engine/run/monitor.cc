@@ -41,6 +41,12 @@ constexpr double kRoundingOfPositions = 0x1p-46;
 /// Replaces an id if there is none; the smallest id of all ranks is found as the largest negative one.
 constexpr double kNoId = -std::numeric_limits<double>::infinity();
 
+/// The time integral of the shear stress, by the work of the flow: γ̇ V ∫ −P_xy dt.
+template <int D>
+double stress_of(double work, const Box<D>& box) {
+  return box.shear_rate == 0 ? 0 : work / (box.shear_rate * box.volume());
+}
+
 }  // namespace
 
 template <int D>
@@ -54,6 +60,7 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
       frames_(plan.frame_interval),
       rows_(plan.thermo_interval),
       tail_(tail_of(system)) {
+  statistics.shear_rate = system.box.shear_rate;
   statistics.tail_energy = tail_.energy;
   statistics.tail_pressure = pressure_of(tail_.virial, system.box, system.box.time);
   if (system.keeps_momentum()) statistics.max_momentum_error = 0;
@@ -251,7 +258,8 @@ void Monitor<D>::settle() {
 /// Begins the means over time at the present time.
 template <int D>
 void Monitor<D>::begin_means() {
-  statistics_.series = Blocking(Statistics::mean_names.size() + column_of_wall_.size());
+  statistics_.series =
+      Blocking(Statistics::mean_names.size() + column_of_wall_.size() + (system_.box.sheared() ? 1 : 0));
 }
 
 /// Adds a slab to the means. `path`: the mean length of the spheres' ways in it.
@@ -284,6 +292,7 @@ void Monitor<D>::add_to_series(const Waiting& slab, double path) {
   for (std::size_t wall = 0; wall < std::min(column_of_wall_.size(), tally.walls.size()); ++wall)
     values_[Statistics::mean_names.size() + column_of_wall_[wall]] +=
         since(tally.walls[wall].impulse, sampled_walls_[wall]);
+  if (system_.box.sheared()) values_.back() = stress_of(since(tally.shear, account_.sampled_shear), system_.box);
   statistics_.series.add(values_, weights_);
 }
 
@@ -363,7 +372,7 @@ Snapshot<D> Monitor<D>::measured(const Waiting& at, const Sums& sums) {
   shot.particles = at.particles;
   shot.collisions = at.tally.sphere_sphere;
   shot.dissipated = at.tally.dissipated.value();
-  shot.work = at.tally.work.value();
+  shot.work = at.tally.work.value() + at.tally.shear.value();
   shot.heat = at.tally.heat.value();
   shot.step_length = statistics_.step_length;
   // The conserved quantity: the energy of the spheres, what they have lost, and less what walls and baths gave them.
@@ -393,6 +402,10 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
                                 ? (collision_virial - account_.last_row_virial) / (shot.time - account_.last_row)
                                 : 0;  // no collisions before the start
   shot.pressure = pressure_of(account_.virial + collisions, system_.box, shot.time);
+  const double work = statistics_.counters.shear.value();
+  if (system_.box.sheared() && account_.last_row >= 0 && shot.time > account_.last_row)
+    shot.shear_stress =
+        stress_of(work - account_.last_row_shear, system_.box) / (shot.time - account_.last_row);
   shot.max_energy_error = statistics_.max_energy_error;
   // Only whole intervals count: the first row has had no collisions, the last one may be early.
   if (row && waits() && !transient_end_ && rows_.due() <= now && shot.time > statistics_.start_time)
@@ -403,6 +416,7 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
     rows_.pass(now);
     account_.last_row = shot.time;
     account_.last_row_virial = collision_virial;
+    account_.last_row_shear = work;
   }
   if (frame) {
     if (system_.decomposition.by_place()) shot.particles = &system_.decomposition.block();

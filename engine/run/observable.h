@@ -106,6 +106,7 @@ struct ObservableInfo {
   std::string_view source;            ///< papers
   ObservableMaker<2> in_2d;
   ObservableMaker<3> in_3d;
+  bool sheared = false;  ///< also for sheared boxes
 
   template <int D>
   const ObservableMaker<D>& in() const {
@@ -113,6 +114,13 @@ struct ObservableInfo {
       return in_2d;
     else
       return in_3d;
+  }
+  /// Completes the parameters, as ObservableMaker::complete.
+  template <int D>
+  std::optional<ParameterError> complete(Parameters& given, const System<D>& system) const {
+    if (system.box.sheared() && !sheared)
+      return ParameterError{"interval", std::string(name) + " does not go with 'shear' yet", "leave one of them out"};
+    return in<D>().complete(given, system);
   }
 };
 

@@ -22,7 +22,7 @@ std::unique_ptr<Observable<D>> make_observable(std::string_view name, const Syst
                                                double start) {
   const ObservableInfo& info = find_observable(name);
   Parameters parameters = completed(info.name, info.parameters, std::move(given));
-  if (const auto wrong = info.in<D>().complete(parameters, system))
+  if (const auto wrong = info.complete(parameters, system))
     throw Error(Failure::deck, std::string(info.name) + ": " + wrong->what + "; " + wrong->remedy);
   return info.in<D>().make(system, parameters, start);
 }

@@ -98,7 +98,8 @@ ObservableInfo pressure_tensor() {
           "trapezoidal sum over samples. Contacts at rest are not counted, as in the pressure of thermo.csv.",
       .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.7",
       .in_2d = maker<PressureTensor, 2>(complete_pressure_tensor<2>),
-      .in_3d = maker<PressureTensor, 3>(complete_pressure_tensor<3>)};
+      .in_3d = maker<PressureTensor, 3>(complete_pressure_tensor<3>),
+          .sheared = true};
 }
 
 }  // namespace carom::observable

@@ -201,7 +201,8 @@ ObservableInfo profile() {
           "long-range corrections (the stress is its negative); error_ and samples_ of all.",
       .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.12",
       .in_2d = maker<Profile, 2>(complete_profile<2>),
-      .in_3d = maker<Profile, 3>(complete_profile<3>)};
+      .in_3d = maker<Profile, 3>(complete_profile<3>),
+          .sheared = true};
 }
 
 }  // namespace carom::observable

@@ -86,6 +86,7 @@ void check_rest_speeds(const System<D>& system) {
 /// count_moving() on.
 template <int D>
 void check_laws(const System<D>& system, const IntegratorInfo& info) {
+  if (const std::string no = info.refusal_of_shear(system, system.has_fixed()); !no.empty()) throw Error(Failure::deck, no);
   if (const std::string no = info.refusal_of_steps(); !no.empty() && !system.box.steps.empty())
     throw Error(Failure::deck, no);
   if (info.stepping && std::isfinite(system.box.steps.least_climb()) && !system.box.contacts.elastic())
@@ -228,6 +229,7 @@ void Simulation<D>::begin(const Hooks& hooks) {
       throw Error(Failure::deck, "all particles are fixed and nothing would move; give some a finite mass");
     check_laws(*system_, info_);
     if (!hooks.restore) check_rest_speeds(*system_);
+    if (const std::string no = shear_problem(*system_, plan_.end_time); !no.empty()) throw Error(Failure::deck, no);
     const double contacts = info_.adapts ? contact_rate(*system_) : 0;
     if (info_.smooth_forces) {
       system_->quanta = quanta(*system_);
@@ -335,11 +337,13 @@ void Simulation<D>::run(const Hooks& hooks) {
   take_time();
 }
 
-/// The next slab of the clock; where its length is free, it ends no later than the motion of a wall.
+/// The next slab of the clock; where its length is free, it ends no later than the motion of a wall, and before the
+/// strain of a sheared box is too large for its lists.
 template <int D>
 Slab Simulation<D>::next_slab() const {
   Slab slab = clock_.next_slab(statistics_);
-  const double left = system_->box.next_end(slab.start) - slab.start;
+  double left = system_->box.next_end(slab.start) - slab.start;
+  if (system_->box.sheared()) left = std::min(left, longest_slab(*system_));
   if ((!info_.stepping || clock_.adapts()) && left < slab.length) {
     slab.length = left;
     slab.ends_step = false;
@@ -466,7 +470,7 @@ void Simulation<D>::need_collisions() const {
 template <int D>
 void Simulation<D>::lengthen_slabs(double length) {
   const double most = clock_.most_steps();
-  if (!(most > 1)) return;
+  if (!(most > 1) || system_->box.sheared()) return;
   double steps = 1;
   if (!system_->box.contacts.elastic()) {
     const double speed = thermal_speed(*system_);

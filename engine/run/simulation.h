@@ -90,7 +90,7 @@ struct Readings {
   std::array<double, D> momentum{};  ///< an array, because a Vec is aligned and would leave gaps in the struct
   double temperature = 0;  ///< Σ m v²/(D N) of the N particles that are not fixed, in units of energy (k_B = 1); total
                            ///< momentum is not subtracted
-  double dissipated = 0, work = 0, heat = 0;  ///< sums of ContactTally so far [energy]
+  double dissipated = 0, work = 0, heat = 0;  ///< sums of ContactTally so far, `work` with that of shear [energy]
   double step_length = 0;                     ///< of the last step or epoch [time]
 };
 
@@ -106,15 +106,20 @@ struct StepReadings {
   double bonds = 0;        ///< pairs inside the outermost of their steps, for each particle
 };
 
+/// The numbers of a Snapshot that runs in a sheared box have in addition.
+struct ShearReadings {
+  double shear_stress = 0;  ///< −P_xy since the last thermo row, from the work of the flow [energy/length^D]
+};
+
 /// What an observer gets: a state and its observables, all at `time`.
 template <int D>
-struct Snapshot : Readings<D>, SpinReadings, StepReadings {
+struct Snapshot : Readings<D>, SpinReadings, StepReadings, ShearReadings {
   const Particles<D>* particles = nullptr;  ///< all particles; with several ranks this rank's block (with ids)
   double max_energy_error = 0;              ///< as in Statistics, so far [energy]
   double pressure = 0;  ///< virial: (Σ m v² + Σ d·F + Σ d·impulse/Δt)/(D V), collisions since the last thermo row
   std::vector<WallLoad> walls{};  ///< in thermo rows: of all walls, in the order of Box::walls()
   double total() const { return this->kinetic + this->potential; }
-  /// What stays constant, whatever contacts, walls and baths do.
+  /// What stays constant, whatever contacts, walls, baths and shear do.
   double conserved() const { return total() + this->dissipated - this->work - this->heat; }
 };
 
@@ -194,10 +199,11 @@ struct Statistics {
   };
   std::optional<Equilibrium> equilibrium;
   /// Means over time with their errors, of samples of one step or epoch each: the columns of `series` are these, then
-  /// the force on each wall by its number (on both sides of a wall by the lower one).
+  /// the force on each wall by its number (on both sides of a wall by the lower one), then in a sheared box the stress.
   static constexpr std::array mean_names = {"pressure",       "temperature",    "potential",
                                             "collision_rate", "mean_free_time", "mean_free_path"};
   Blocking series;
+  double shear_rate = 0;       ///< of the box [1/time]
   double wall_seconds = 0;     ///< spent in the loop of run()
   bool stopped_early = false;  ///< should_stop has ended it
 
@@ -205,6 +211,8 @@ struct Statistics {
   Estimate estimate(std::size_t column) const {
     return column < series.columns() ? series.estimate(column) : Estimate();
   }
+  /// The mean of −P_xy in a sheared box; nothing but NaN in others.
+  Estimate shear_stress() const { return shear_rate != 0 ? estimate(series.columns() - 1) : Estimate(); }
   /// Where an estimate has no standard error: the time to which the run must go at least to give it one, at the
   /// correlations seen so far. NaN if there is one, or nothing can be said.
   double needed_time(const Estimate& estimate) const {

@@ -75,9 +75,12 @@ void restore_field(System<D>& system, Fields::Field& field, const StateReader& r
   if (!mine.empty()) std::memcpy(field.data(), mine.data(), mine.size());
 }
 
-/// Sets the particles of a system, from which a run will be continued.
+/// Sets the particles of a system and the tilt of its images, from which a run will be continued. Collective.
 template <int D>
 void restore_particles(System<D>& system, const StateReader& read) {
+  Communicator& ranks = system.decomposition.ranks();
+  Archive tilt(std::move(ranks.gather(ranks.rank() == 0 ? read("tilt") : Bytes())[0]));
+  tilt(system.box.tilt);
   for (const auto& field : system.fields.of_particles())
     if (field->kind != Fields::Kind::constant) restore_field(system, *field, read);
 }

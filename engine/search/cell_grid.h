@@ -5,7 +5,8 @@
 // Positions are mapped to *unwrapped* integer cells: a position outside a periodic box, or an image of one, has cell
 // numbers of its own there, and the difference of two unwrapped cells gives the image of a neighbour. (The nearest
 // image of two positions is wrong if the box is dilute or small.) Along open and walled axes the outermost cells extend
-// to infinity. Only the search uses the cells: results never depend on them.
+// to infinity. If the lattice of images is tilted (Box::tilt), the boxes above and below the first row of boxes are
+// displaced along the first axis, and so are their cells. Only the search uses the cells: results never depend on them.
 
 #include <algorithm>
 #include <cmath>
@@ -76,13 +77,17 @@ class CellGrid {
   /// The unwrapped cell of a position.
   Cell<D> cell(const Vec<D>& x) const {
     Cell<D> c;
-    for (int k = 0; k < D; ++k) {
-      double at = std::floor((x[k] - origin_[k]) * inverse_[k]);
-      if (!box_.periodic(k)) at = std::clamp(at, 0.0, count_[k] - 1.0);
-      c[k] = static_cast<std::int32_t>(at);
-    }
+    for (int k = 0; k < D; ++k) c[k] = cell(k, x[k]);
+    if (box_.tilt != 0) c[0] = cell(0, upright(x[0], boxes(1, c[1])));
     return c;
   }
+  std::int32_t cell(int axis, double x) const {
+    double at = std::floor((x - origin_[axis]) * inverse_[axis]);
+    if (!box_.periodic(axis)) at = std::clamp(at, 0.0, count_[axis] - 1.0);
+    return static_cast<std::int32_t>(at);
+  }
+  /// A coordinate along the first axis, in a row of boxes, relative to the displacement of this row.
+  double upright(double x, std::int32_t row) const { return x - row * box_.tilt; }
 
   /// The coordinate of the lower face of unwrapped cell number c on an axis.
   double face(int axis, std::int32_t c) const { return origin_[axis] + c * edge_[axis]; }
@@ -176,6 +181,8 @@ class CellGrid {
       low[k] = centre[k] - range[k], high[k] = centre[k] + range[k];
       if (!box_.periodic(k)) low[k] = std::max(low[k], 0), high[k] = std::min(high[k], count_[k] - 1);
     }
+    if (box_.tilt != 0) [[unlikely]]
+      return for_each_range_tilted(centre, low, high, half, visit);
     Image<D> boxes;
     const auto offset = [&](int k, std::int32_t c) {
       boxes[k] = this->boxes(k, c);
@@ -203,6 +210,32 @@ class CellGrid {
 
  private:
   static constexpr double kLargestRange = 1e8;  // cells
+
+  /// for_each_range() in a tilted lattice. A pair of cells comes once with `half`, which is in the order of the second,
+  /// first and third axis here: the cells of one row of boxes are not displaced relative to each other.
+  template <class Visit>
+  [[gnu::noinline]] void for_each_range_tilted(const Cell<D>& centre, const Cell<D>& low, const Cell<D>& high,
+                                               bool half, Visit& visit) const {
+    const std::int32_t own = boxes(1, centre[1]);
+    for (std::int32_t b = half ? centre[1] : low[1]; b <= high[1]; ++b) {
+      Cell<D> at;
+      at[1] = b;
+      const double away = -(boxes(1, b) - own) * box_.tilt * inverse_[0];  // of the centre, as seen in this row [cell]
+      const auto down = static_cast<std::int32_t>(std::floor(away)), up = static_cast<std::int32_t>(std::ceil(away));
+      const bool same = half && b == centre[1];
+      for (std::int32_t a = same ? centre[0] : low[0] + down; a <= high[0] + up; ++a) {
+        at[0] = a;
+        const auto look = [&] {
+          const std::size_t cell = index(at);
+          visit(cell, cell + 1, boxes(at));
+        };
+        if constexpr (D == 2)
+          look();
+        else
+          for (at[2] = same && a == centre[0] ? centre[2] : low[2]; at[2] <= high[2]; ++at[2]) look();
+      }
+    }
+  }
 
   std::int32_t wrapped(int axis, std::int32_t c) const {
     if (!box_.periodic(axis) || (c >= 0 && c < count_[axis])) return c;

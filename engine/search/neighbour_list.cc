@@ -31,6 +31,7 @@ NeighbourList<D>::NeighbourList(const Box<D>& box, std::vector<double> reach, st
 template <int D>
 std::span<const NeighbourPair<D>> NeighbourList<D>::cover(std::span<const Vec<D>> x, std::span<const Vec<D>> x_new,
                                                           double margin) {
+  if (box_.tilt != built_with_tilt_) built_at_.clear();  // the images have moved
   const bool known = built_at_.size() == x.size(), still = x.data() == x_new.data();
   std::vector<Image<D>> crossed;
   double squared_from_build = 0, squared_step = 0;  // the largest over all particles
@@ -90,6 +91,7 @@ bool NeighbourList<D>::build(std::span<const Vec<D>> x) {
                   "the position of particle " + std::to_string(i) + " is not finite; use a smaller integrator.step");
   ++rebuilds_;
   built_at_.assign(x.begin(), x.end());
+  built_with_tilt_ = box_.tilt;
   pairs_.clear();
   partners_.clear();
   SizedCells<D> cells(box_, reach_, Extent<D>(x), skin_.width());

@@ -59,6 +59,7 @@ class NeighbourList {
   std::vector<char> fixed_;
   Skin skin_;
   std::vector<Vec<D>> built_at_;  // positions at the last build, moved along when a particle is wrapped
+  double built_with_tilt_ = 0;
   std::vector<NeighbourPair<D>> pairs_;
   Partners partners_;  // empty if not used since the last build
   std::uint64_t rebuilds_ = 0;

@@ -13,6 +13,7 @@
 #include "engine/base/pages.h"
 #include "engine/base/record.h"
 #include "engine/search/cell_grid.h"
+#include "engine/search/flow_frame.h"
 #include "engine/search/simd/scan.h"
 
 namespace carom {
@@ -44,8 +45,8 @@ class RegionCells {
     const std::int32_t* away;  ///< by sphere: the boxes between its cell and the position's, as a linear image
     std::int32_t boxes;        ///< the box of the position, as a linear image
   };
-  /// The spheres within a distance of x, once for each image. Valid until the next call.
-  Found find(const Vec<D>& x, double reach);
+  /// The spheres within a distance of x, at some strain of a flow, once for each image. Valid until the next call.
+  Found find(const Vec<D>& x, double reach, const FlowFrame& flow = {});
 
  private:
   struct Located {
@@ -55,9 +56,11 @@ class RegionCells {
     std::array<std::int32_t, D> place{};  // in 1024ths of a cell
   };
 
+  std::size_t look_along(int axis, std::int32_t here, std::int32_t place, double reach, std::int32_t away);
   static double edge(const Box<D>& box, const Extent<D>& extent, double spheres, double reach);
   static double rounded(double reach);
   const Located& locate(const Vec<D>& x);
+  std::int32_t place_in(int axis, double x, std::int32_t cell) const;
 
   Packing<D> packing_;
   const ScanKernels& kernels_;

@@ -6,10 +6,11 @@
 namespace carom {
 
 template <int D>
-SkinLists<D>::SkinLists(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels,
+SkinLists<D>::SkinLists(const Box<D>& box, const FlowFrame& flow, const Packing<D>& packing, const ScanKernels& kernels,
                         std::span<const double> reach, bool equal, double largest, double skin,
                         PageVector<NextEvent<D>>& next_events)
     : box_(box),
+      flow_(flow),
       packing_(packing),
       kernels_(kernels),
       reach_(reach),
@@ -53,7 +54,8 @@ void SkinLists<D>::build(std::size_t n, const std::function<Vec<D>(Slot)>& place
         static_cast<double>(members[o]) * static_cast<double>(extent.particles) / std::max(static_cast<double>(n), 1.0);
     const double farthest = largest_ + largest + 2 * (skin_ + max_displacement);
     levels_.push_back({largest, RegionCells<D>(box_, packing_, kernels_, extent, all,
-                                               2 * (std::max(largest, 1e-300) + skin_), farthest)});
+                                               flow_.widened(2 * (std::max(largest, 1e-300) + skin_)),
+                                               flow_.widened(farthest))});
     RegionCells<D>& cells = levels_.back().cells;
     if (n < extent.particles) cells.confine(places);
     cells.clear();
@@ -105,11 +107,11 @@ std::span<const std::uint32_t> SkinLists<D>::surround(Slot i, const Vec<D>& x, d
 
 template <int D>
 void SkinLists<D>::look_into(Level& level, Slot i, const Vec<D>& x, double max_displacement, unsigned& found) {
-  const auto near = level.cells.find(x, reach(i) + level.largest_reach + 2 * (skin_ + max_displacement));
+  const auto near = level.cells.find(x, reach(i) + level.largest_reach + 2 * (skin_ + max_displacement), flow_);
   const auto n = static_cast<unsigned>(near.slots.size());
   if (found_.size() < found + n + 8) found_.resize(std::size_t{2} * (found + n + 8));
   const std::int32_t carried = near.boxes;
-  const bool far = 2 * widest_ > packing_.largest();
+  const bool far = (box_.tilt == 0 ? 2 : 3) * widest_ > packing_.largest();
   for (unsigned q = 0; q < n; ++q) {
     const Slot j = near.slots[q];
     if (far) {
@@ -122,7 +124,7 @@ void SkinLists<D>::look_into(Level& level, Slot i, const Vec<D>& x, double max_d
     if (exact_) {
       const Vec<D> d = x - centre(j) + box_.shift(packing_.image(candidate));
       const double within = reach(i) + reach(j) + 2 * (skin_ + max_displacement);
-      if (!(d.squaredNorm() < within * within)) continue;
+      if (!(flow_.least_squared(d) < within * within)) continue;
     }
     found_[found] = candidate;
     found += j != i ? 1 : 0;
@@ -218,9 +220,11 @@ void SkinLists<D>::dismiss(Slot i) {
 }
 
 template <int D>
-bool SkinLists<D>::move(Slot i, const Vec<D>& x, double room) {
+bool SkinLists<D>::move(Slot i, const Vec<D>& x, double room, double now) {
   const double limit = room * (1 - 1e-6);
-  if ((x - centre(i)).squaredNorm() < limit * limit) return false;
+  Vec<D> d = x - centre(i);
+  d[0] += flow_.strain(now) * d[1];
+  if (d.squaredNorm() < limit * limit) return false;
   renew(i, x);
   return true;
 }

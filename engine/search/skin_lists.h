@@ -7,6 +7,9 @@
 // The centres of the regions are stored in cells (region_cells.h); each factor of two in reach has separate cells, so
 // that a small sphere does not search cells as large as the largest sphere. Lists are symmetric. (Verlet, Phys. Rev.
 // 159 (1967) 98; event-driven: Donev, Torquato, Stillinger, J. Comput. Phys. 202 (2005) 737.)
+//
+// In a sheared box the regions move with the flow. All positions are then coordinates of flow_frame.h, in which regions
+// stand still; lists hold the spheres that are near at any strain of the frame.
 
 #include <functional>
 #include <span>
@@ -14,6 +17,7 @@
 
 #include "engine/base/prefetch.h"
 #include "engine/search/candidate_lists.h"
+#include "engine/search/flow_frame.h"
 #include "engine/search/next_event.h"
 #include "engine/search/region_cells.h"
 
@@ -23,11 +27,18 @@ template <int D>
 class SkinLists {
  public:
   /// `reach`, by slot, is the largest reach (Sizes) that a sphere will have; if all are and stay `equal`, only the
-  /// first is used. Spheres admitted later have reaches of at most `largest`.
-  SkinLists(const Box<D>& box, const Packing<D>& packing, const ScanKernels& kernels, std::span<const double> reach,
-            bool equal, double largest, double skin, PageVector<NextEvent<D>>& next_events);
+  /// first is used. Spheres admitted later have reaches of at most `largest`. The tilt of `box` is that at the time of
+  /// the frame.
+  SkinLists(const Box<D>& box, const FlowFrame& flow, const Packing<D>& packing, const ScanKernels& kernels,
+            std::span<const double> reach, bool equal, double largest, double skin, PageVector<NextEvent<D>>& next_events);
 
   double skin() const { return skin_; }
+  const FlowFrame& flow() const { return flow_; }
+  /// Lists made from now on need not hold before this time, nor, if windows are repaired, before this much less strain.
+  void pass(double now, double strain) {
+    const double back = flow_.rate > 0 ? strain : -strain, from = flow_.strain(now) - back;
+    if (std::abs(flow_.to - from) < std::abs(flow_.to - flow_.from)) flow_.from = from;
+  }
   const std::uint32_t* candidates(const NextEvent<D>& a) const { return lists_.of(a); }
 
   /// Makes all lists for n spheres with centres place(slot). `max_displacement` is the largest that find_near() will
@@ -47,9 +58,9 @@ class SkinLists {
   void admit(Slot i, const Vec<D>& x, std::span<const double> reach);
   /// Removes a sphere.
   void dismiss(Slot i);
-  /// The sphere is now at x: renews its list if x is farther than `room` from the centre of its region; returns whether
+  /// The sphere is now at x: renews its list if it is farther than `room` from the centre of its region; returns whether
   /// it was.
-  bool move(Slot i, const Vec<D>& x, double room);
+  bool move(Slot i, const Vec<D>& x, double room, double now);
   /// Starts to fetch the list of a sphere, at most as far as a typical list of equal spheres extends.
   void prefetch(const NextEvent<D>& a) const {
     for (const unsigned q : {0u, 16u, 32u}) prefetch_line(candidates(a) + q);
@@ -80,6 +91,7 @@ class SkinLists {
   void shift(Slot i, const Image<D>& boxes);
 
   Box<D> box_;
+  FlowFrame flow_;
   Packing<D> packing_;
   const ScanKernels& kernels_;
   std::span<const double> reach_;

@@ -29,6 +29,7 @@ class Compressor {
       each.velocity = each.amplitude = each.temperature = 0;
     }
     box_.bath = {};
+    box_.shear_rate = box_.tilt = 0;
     const std::size_t n = radius.size();
     particles_.x.resize(n);
     particles_.v.assign(n, Vec<D>::Zero());

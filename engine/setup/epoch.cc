@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <limits>
 
 #include "engine/base/record.h"
@@ -27,6 +28,8 @@ constexpr double kFarthestInBoxes = 4;
 /// In an epoch a sphere may become this many times faster than all were before: it gets up to twice the speed of a
 /// heavy sphere.
 constexpr double kFaster = 4;
+/// Slabs of a run in a sheared box: 10⁹ take a day even for a few spheres.
+constexpr double kMostSlabs = 1e9;
 /// The longest epoch, relative to the last one.
 constexpr double kLonger = 64;
 
@@ -79,12 +82,35 @@ double contact_rate(const System<D>& system) {
 }
 
 template <int D>
+double longest_slab(const System<D>& system) {
+  // The images of a row of boxes slide by half of the strain before and after the middle of the slab.
+  const Box<D>& box = system.box;
+  const double boxes = Packing<D>(1, system.size()).largest() - 2;
+  return std::min(kStrainOfSlab, 2 * boxes * box.edges[0] / box.edges[1]) / std::abs(box.shear_rate);
+}
+
+template <int D>
+std::string shear_problem(const System<D>& system, std::optional<double> end_time) {
+  const Box<D>& box = system.box;
+  if (!box.sheared()) return "";
+  if (Packing<D>(1, system.size()).largest() < 3)
+    return "'shear' is for fewer particles, because the numbers of images have few bits beside so many; take fewer";
+  if (!std::isfinite(box.slide() * box.slide()) || (end_time && *end_time > kMostSlabs * longest_slab(system)))
+    return "the rate of 'shear', " + short_text(box.shear_rate) + ", is so large that the run would have more than " +
+           short_text(kMostSlabs) + " epochs, one for a strain of " + short_text(kStrainOfSlab) +
+           "; give a smaller rate, or end the run earlier";
+  return "";
+}
+
+template <int D>
 double default_epoch(const System<D>& system) {
   const auto [thermal_speed, light_speed, fastest, rate] = gas_of(system);
   if (thermal_speed == 0) return 1;
   const Bath& bath = system.box.bath;
   const double farthest = kFarthestInBoxes * system.box.edges.maxCoeff();
   double epoch = std::min(kEventsOfEpoch / rate, farthest / std::max(thermal_speed, light_speed));
+  // The flow makes neighbours meet about once in a strain, also if they are cold.
+  if (system.box.shear_rate != 0) epoch = std::min(epoch, kEventsOfEpoch / std::abs(system.box.shear_rate));
   if (bath.acts_at_ends()) epoch = std::min(epoch, kEpochOfRelaxation / bath.relaxation_rate());
   // The images of the fastest particles, also in equilibrium, must fit into a candidate on any number of ranks.
   const double speed = std::max(fastest, 5 * light_speed);
@@ -141,6 +167,10 @@ double next_epoch(const System<D>& system, const PastEpoch& past) {
   return longest;
 }
 
+template double longest_slab(const System<2>&);
+template double longest_slab(const System<3>&);
+template std::string shear_problem(const System<2>&, std::optional<double>);
+template std::string shear_problem(const System<3>&, std::optional<double>);
 template double contact_rate(const System<2>&);
 template double contact_rate(const System<3>&);
 template double default_epoch(const System<2>&);

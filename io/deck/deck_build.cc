@@ -123,7 +123,7 @@ void complete_values(Deck& deck, System<D>& system, const GivenState* given, Pro
   }
   ValueTable& output = *source.values.find("output");
   for (auto& [info, parameters] : deck.output.observables) {
-    if (const auto wrong = info->template in<D>().complete(parameters, system))
+    if (const auto wrong = info->complete(parameters, system))
       problems.error(output.place(output_key(*info, wrong->parameter)), wrong->what, wrong->remedy);
     for (const auto& [name, value] : parameters.all()) output.values.set(output_key(*info, name), value);
   }
@@ -177,6 +177,8 @@ template <int D>
 void fill_box(const Deck::Source& source, System<D>& system) {
   std::copy_n(source.boundary.begin(), D, system.box.boundary.begin());
   if (!source.edges.empty()) std::copy_n(source.edges.begin(), D, system.box.edges.begin());
+  system.box.shear_rate = source.shear_rate;
+  system.box.tilt = source.tilt;
   for (const ValueTable& wall : source.values.list("wall"))
     if (!wall.wrong) add_wall(system.box, wall.values, source.placement.seed);
   for (const ValueTable& bath : source.values.list("bath"))
@@ -265,6 +267,11 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const G
   Problems problems;
   bond_near(*deck.source, *system, problems);
   make_interactions(source, *system, true, problems);
+  const bool fixed = std::ranges::any_of(source.species, &SpeciesConfig::fixed);
+  if (const std::string no = source.integrator->refusal_of_shear(*system, fixed); !no.empty())
+    problems.error(source.shear, no);
+  else if (const std::string too_fast = shear_problem(*system, deck.plan.end_time); !too_fast.empty())
+    problems.error(source.shear, too_fast);
   problems.throw_errors(Failure::deck);
   if (given && !given->branch) return system;
   complete_values(deck, *system, given, problems);

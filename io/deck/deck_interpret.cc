@@ -74,6 +74,13 @@ class Interpreter {
       one_an_axis(*table, "boundary", boundary->size());
       for (const std::string& name : *boundary) source_.boundary.push_back(find_boundary(name).boundary);
     }
+    source_.shear = table->place("shear");
+    if (const auto* shear = table->find<TableValue>("shear")) source_.shear_rate = std::get<double>(shear->at("rate"));
+    if (table->read<double>("tilt", source_.tilt); table->given("tilt")) {
+      if (!table->given("shear")) source_.shear = table->place("tilt");
+      if (!(source_.tilt >= 0) || (!source_.edges.empty() && !(source_.tilt < source_.edges[0])))
+        problems_.error(table->place("tilt"), "'tilt' is not between 0 and the edge along x", "add or take off edges");
+    }
   }
 
   /// Adds walls, contacts and steps to a box, if enough is known about it.

@@ -47,9 +47,10 @@ struct InteractionConfig {
 
 struct Deck::Source {
   DeckValues values;
-  Place system, box, step;
+  Place system, box, step, shear;
   std::vector<double> edges;  ///< empty: the packing fraction sets them
   std::vector<Boundary> boundary;
+  double shear_rate = 0, tilt = 0;
   std::vector<SpeciesConfig> species;
   PlacementConfig placement;
   std::vector<InteractionConfig> interactions;

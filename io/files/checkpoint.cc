@@ -23,7 +23,7 @@ namespace carom {
 namespace {
 
 constexpr std::size_t kHeadBlock = 512;  // before HDF5's own bytes
-constexpr int kFormat = 7;
+constexpr int kFormat = 8;
 constexpr std::string_view kBegin = "carom checkpoint ";
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {

@@ -73,8 +73,8 @@ std::string write_extxyz(const TrajectoryReader& trajectory, std::span<const std
     const TrajectoryFrame f = trajectory.frame(index);
     fmt::memory_buffer text;
     const auto out = fmt::appender(text);
-    fmt::format_to(out, "{}\nLattice=\"{} 0 0 0 {} 0 0 0 {}\"", trajectory.particles(), f.edges[0], f.edges[1],
-                   f.edges[2]);
+    fmt::format_to(out, "{}\nLattice=\"{} 0 0 {} {} 0 0 0 {}\"", trajectory.particles(), f.edges[0], f.tilt,
+                   f.edges[1], f.edges[2]);
     fmt::format_to(
         out,
         " Properties=species:S:1:pos:R:3:velo:R:3:radius:R:1:mass:R:1:charge:R:1:image:I:3{} Time={} Step={} pbc=\"",
@@ -133,6 +133,9 @@ std::string write_lammps_data(const TrajectoryReader& trajectory, std::span<cons
     fmt::format_to(out, "{} {} {}lo {}hi\n", low, high, "xyz"[k], "xyz"[k]);
   }
 
+  const bool back = f.tilt > 0.5 * f.edges[0];  // LAMMPS wants tilts of at most half an edge
+  if (f.tilt != 0) fmt::format_to(out, "{} 0 0 xy xz yz\n", back ? f.tilt - f.edges[0] : f.tilt);
+
   // 3. The particles.
   const auto write = [&](bool all) {
     if (!all && text.size() < kBytesPerWrite) return;
@@ -153,7 +156,7 @@ std::string write_lammps_data(const TrajectoryReader& trajectory, std::span<cons
     } else {
       fmt::format_to(out, "{} {} {} {} {} {} {}", i + 1, trajectory.species[i] + 1, 2 * r, density, x[0], x[1], x[2]);
     }
-    fmt::format_to(out, " {} {} {}\n", image[0], image[1], image[2]);
+    fmt::format_to(out, " {} {} {}\n", image[0] + (back ? image[1] : 0), image[1], image[2]);
     write(false);
   }
   fmt::format_to(out, "\nVelocities\n\n");

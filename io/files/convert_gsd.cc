@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <type_traits>
 #include <utility>
 
@@ -51,17 +52,25 @@ void each_chunk(const TrajectoryReader& t, std::uint64_t number, const Trajector
   std::vector<float> box = {static_cast<float>(f.edges[0]),
                             static_cast<float>(f.edges[1]),
                             flat ? 0.0f : static_cast<float>(f.edges[2]),
-                            0,
+                            static_cast<float>(f.tilt / f.edges[1]),
                             0,
                             0};
   chunk("configuration/box", box, 1);
   chunk("particles/N", std::vector{static_cast<std::uint32_t>(t.particles())}, 1);
   std::vector<float> position(f.position.size());
-  for (std::size_t i = 0; i < position.size(); ++i)
-    position[i] = flat && i % 3 == 2 ? 0.0f : static_cast<float>(f.position[i] - f.edges[i % 3] / 2);
+  std::vector<std::int32_t> image = f.image;
+  for (std::size_t i = 0; i < position.size(); ++i) {
+    double x = f.position[i] - f.edges[i % 3] / 2;
+    if (i % 3 == 0 && f.tilt != 0) {  // into the oblique box of HOOMD, around the origin
+      const double row = f.tilt * (f.position[i + 1] / f.edges[1] - 0.5), boxes = std::floor((x - row) / f.edges[0] + 0.5);
+      x -= boxes * f.edges[0];
+      image[i] += static_cast<std::int32_t>(boxes);
+    }
+    position[i] = flat && i % 3 == 2 ? 0.0f : static_cast<float>(x);
+  }
   chunk("particles/position", position, 3);
   chunk("particles/velocity", single(f.velocity), 3);
-  chunk("particles/image", f.image, 3);
+  chunk("particles/image", image, 3);
   if (!f.spin.empty()) {
     // HOOMD's conjugate quaternion of the angular momentum L in the frame of the body is 2 q (0, L); the orientation q
     // of a sphere, which Carom does not follow, is the default (1, 0, 0, 0).

@@ -379,6 +379,7 @@ void TrajectoryWriter<D>::frame(const Snapshot<D>& s) {
   const Vec<D> lengths = c.box_of.lengths(s.time);
   std::array<double, 9> edges{0, 0, 0, 0, 0, 0, 0, 0, 1};  // in two dimensions 1 along z
   for (int k = 0; k < D; ++k) edges[4 * static_cast<std::size_t>(k)] = lengths[k];
+  edges[3] = c.box_of.tilt;
   c.edges.value.append(edges);
   for (auto& [element, column] : c.observables) {
     std::vector<double> row(column->components() > 1 ? 3 : 1);

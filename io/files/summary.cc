@@ -53,7 +53,7 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
         {"reference", s.energy_reference},
         {"max_abs_error", s.max_energy_error},
         {"dissipated", c.dissipated.value()},
-        {"work", c.work.value()},
+        {"work", c.work.value() + c.shear.value()},
         {"heat", c.heat.value()},
         {"folded", s.energy_reference > 0 ? c.folded / s.energy_reference : 0.0}}},
       {"tail", {{"energy", s.tail_energy}, {"pressure", s.tail_pressure}}},
@@ -89,6 +89,16 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
          s.steps > s.start_steps ? (s.end_time - s.start_time) / static_cast<double>(s.steps - s.start_steps) : 0.0},
         {"longest", s.longest_step},
         {"local_error", s.local_error}};
+  if (s.shear_rate != 0) {
+    const Estimate stress = s.shear_stress();
+    Estimate viscosity = stress;
+    viscosity.mean /= s.shear_rate;
+    viscosity.error /= std::abs(s.shear_rate);
+    json["shear"] = {{"rate", s.shear_rate},
+                     {"work", c.shear.value()},
+                     {"stress", json_of(stress, s)},
+                     {"viscosity", json_of(viscosity, s)}};
+  }
   if (s.rotational_energy) json["energy"]["rotational"] = *s.rotational_energy;
   for (const WallRecord& wall : outcome.walls) {  // both sides of a wall have one name
     const WallTally none, &tally = wall.number < c.walls.size() ? c.walls[wall.number] : none;

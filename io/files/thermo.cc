@@ -49,7 +49,7 @@ const std::vector<Column<D>>& columns() {
        [](S s, int) { return s.conserved(); }, "conserved", "conserved_energy"},
       {"dissipated", number, "energy", "energy lost at inelastic contacts so far",  //
        [](S s, int) { return s.dissipated; }, "dissipated", "dissipated_energy"},
-      {"work", number, "energy", "work of moving walls so far",  //
+      {"work", number, "energy", "work of moving walls and of shear so far",  //
        [](S s, int) { return s.work; }, "work", "work"},
       {"heat", number, "energy", "heat from thermal walls and baths so far",  //
        [](S s, int) { return s.heat; }, "heat", "heat"},
@@ -60,7 +60,9 @@ const std::vector<Column<D>>& columns() {
       {"step_length", number, "time", "length of the last step or epoch",  //
        [](S s, int) { return s.step_length; }, "step_length", "step_length"},
       {"bonds", number, "-", "pairs inside the outermost of their steps, for each particle",  //
-       [](S s, int) { return s.bonds; }, nullptr, "bonds"}};
+       [](S s, int) { return s.bonds; }, nullptr, "bonds"},
+      {"shear_stress", number, "energy/length^D", "−P_xy since the last row, from the work of the flow; 0 without shear",  //
+       [](S s, int) { return s.shear_stress; }, "shear_stress", "shear_stress"}};
   return all;
 }
 template const std::vector<Column<2>>& columns();

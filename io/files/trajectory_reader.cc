@@ -71,6 +71,7 @@ TrajectoryFrame TrajectoryReader::frame(std::uint64_t index) const {
   frame.step = static_cast<std::int64_t>(hdf5::number_at(file_, kParticles + "position/step", index));
   for (std::size_t k = 0; k < 3; ++k)
     frame.edges[k] = hdf5::diagonal_at(file_, kParticles + "box/edges/value", index, static_cast<int>(k));
+  frame.tilt = hdf5::rows<double>(file_, kParticles + "box/edges/value", index, 1).at(3);
   frame.position = hdf5::rows<double>(file_, kParticles + "position/value", index, 1);
   frame.velocity = hdf5::rows<double>(file_, kParticles + "velocity/value", index, 1);
   frame.image = hdf5::rows<std::int32_t>(file_, kParticles + "image/value", index, 1);

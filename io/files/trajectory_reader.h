@@ -20,6 +20,7 @@ struct TrajectoryFrame {
   double time = 0;
   std::int64_t step = 0;
   std::array<double, 3> edges{};           ///< in two dimensions 1 along z
+  double tilt = 0;                         ///< of the second edge along the first axis, in [0, edges[0])
   std::vector<double> position, velocity;  ///< positions wrapped into the box
   std::vector<double> spin;                ///< angular velocities; empty if contacts are smooth
   std::vector<std::int32_t> image;

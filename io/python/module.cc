@@ -148,21 +148,24 @@ void bind(py::module_& module, const char* name) {
            })
       .def("set_output", &S::set_output)
       .def_property_readonly("begun", &S::begun)
+      .def_property_readonly("tilt", &S::tilt)
       .def("draw", [](S& session, const Array& temperature, std::uint64_t seed,
                       bool spins) { session.draw(span_of(temperature), seed, spins); })
       .def("means",
            [](const S& session) {
              py::dict all;
              const Statistics& statistics = session.statistics();
-             for (std::size_t k = 0; k < Statistics::mean_names.size(); ++k) {
-               const Estimate e = statistics.estimate(k);
+             const auto add = [&](const char* name, const Estimate& e) {
                py::dict entry;
                entry["mean"] = e.mean;
                entry["standard_error"] = e.error;
                entry["independent_samples"] = e.samples;
                entry["needed_time"] = statistics.needed_time(e);
-               all[Statistics::mean_names[k]] = entry;
-             }
+               all[name] = entry;
+             };
+             for (std::size_t k = 0; k < Statistics::mean_names.size(); ++k)
+               add(Statistics::mean_names[k], statistics.estimate(k));
+             if (statistics.shear_rate != 0) add("shear_stress", statistics.shear_stress());
              return all;
            })
       .def("averages",

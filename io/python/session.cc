@@ -260,6 +260,7 @@ template <int D>
 void Session<D>::set(const std::string& name, Parameters given) {
   if (name == "wall") return set_wall(std::move(given));
   if (name == "contact") return add_contact(std::move(given));
+  if (name == "shear") return set_shear(std::move(given));
   if (name == "step") return add_step(std::move(given));
   if (name == "interaction") return add_force(std::move(given));
   ValueTable table = table_of(name, std::move(given));
@@ -314,6 +315,31 @@ void Session<D>::set_wall(Parameters given) {
   system_->box = box_ = box;
   values_.list("wall") = std::move(all);
   set_contacts(values_.list("contact"));
+}
+
+/// Shears the box with a rate, and sets the tilt if it is given; a rate of 0 ends the flow.
+template <int D>
+void Session<D>::set_shear(Parameters given) {
+  const double rate = given.real("rate");
+  if (!std::isfinite(rate)) refuse("the rate of shear is not finite; give a number");
+  const double tilt = given.has("tilt") ? given.real("tilt") : box_.tilt;
+  if (!(tilt >= 0 && tilt < box_.edges[0])) refuse("the tilt is not between 0 and the edge along x");
+  change("set the shear");
+  box_.shear_rate = rate;
+  box_.tilt = tilt;
+  system_->box = box_;
+  note_tilt();
+  Parameters& of_system = values_.find("system")->values;
+  of_system.erase("shear");
+  if (rate != 0) of_system.set("shear", TableValue{{"rate", rate}});
+}
+
+/// Writes the present tilt into the values, from which decks are made.
+template <int D>
+void Session<D>::note_tilt() {
+  Parameters& of_system = values_.find("system")->values;
+  of_system.erase("tilt");
+  if (box_.tilt != 0) of_system.set("tilt", box_.tilt);
 }
 
 template <int D>
@@ -530,6 +556,8 @@ template <int D>
 void Session<D>::rest(Particles<D>& particles) {
   for (auto* each : {&particles.x, &particles.v}) each->resize(size_, Vec<D>::Zero());  // if free flight has failed
   box_.time = statistics_.end_time;
+  box_.tilt = at_work_->box.tilt;
+  note_tilt();
   box_.bath = at_work_->box.bath;  // with the times of its ramp
   system_ = std::make_unique<System<D>>();
   system_->box = box_;

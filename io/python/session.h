@@ -90,6 +90,8 @@ class Session : Observer<D> {
   /// By species; 0 or missing: homogeneous.
   const std::vector<double>& inertias() const { return box_.contacts.inertias; }
   const std::vector<std::string>& species() const { return species_; }
+  /// The tilt of the lattice of images (Box), also during a run [length].
+  double tilt() const { return (at_work_ ? at_work_->box : box_).tilt; }
   std::size_t size() const { return size_; }
   /// Null if there is none yet.
   const IntegratorInfo* integrator() const;
@@ -116,6 +118,8 @@ class Session : Observer<D> {
   double present() const { return showing_ ? shot_->time : statistics().end_time; }
   void set_wall(Parameters given);
   void add_contact(Parameters given);
+  void set_shear(Parameters given);
+  void note_tilt();
   void add_step(Parameters given);
   void set_pair_steps(std::vector<ValueTable> all);
   void add_force(Parameters given);

@@ -461,3 +461,44 @@ def test_too_many_collisions_in_a_window(tmp_path):
     done = mpirun(2, command(path, tmp_path / "two", limit), code=4)
     for text in plain.stderr, done.stderr:
         assert "more than max_events_per_step = 27000 collisions in one step" in text
+
+
+# A sheared mixture of rough and inelastic spheres between two walls, one of them thermal, with a bath and a field.
+SHEARED = tomllib.loads(SPHERES) | {
+    "title": "sheared",
+    "system": {"dimension": 3, "box": [9.0, 10.0, 8.0], "boundary": ["periodic", "periodic", "wall"], "shear": {"rate": 1.2}},
+    "particles": [{"name": "large", "count": 120, "temperature": 1.0, "radius": 0.6, "mass": 2.0},
+                  {"name": "small", "count": 160, "temperature": 1.0, "rotational_temperature": 0.5, "radius": 0.4}],
+    "contact": [{"between": ["*", "*"], "restitution": 0.9, "tangential": 0.5, "friction": 0.3}],
+    "wall": [{"name": "z-", "temperature": 2.0}],
+    "bath": [{"type": "andersen", "temperature": 1.0, "rate": 0.2}],
+    "interaction": [{"type": "uniform-field", "acceleration": [0.0, 0.0, -0.2]}],
+    "placement": {"type": "random", "seed": 4},
+    "integrator": {"type": "free-flight"},
+    "run": {"end_time": 4.0},
+    "output": {"directory": "unused", "frame_interval": 0.7, "thermo_interval": 0.3}}
+# Equal elastic spheres.
+SHEARED_SIMPLY = SHEARED | {
+    "system": {"dimension": 3, "boundary": ["periodic"] * 3, "shear": {"rate": -0.7}}, "contact": [], "wall": [], "bath": [], "interaction": [],
+    "particles": [{"name": "sphere", "count": 500, "temperature": 1.0, "radius": 0.5}],
+    "placement": {"type": "fcc", "packing_fraction": 0.3, "seed": 4}}
+
+
+# Few collisions in a box that is much higher than long, and in a flat one.
+SHEARED_THIN = SHEARED_SIMPLY | {
+    "system": {"dimension": 3, "box": [8.0, 80.0, 10.0], "boundary": ["periodic"] * 3, "shear": {"rate": 2.0}},
+    "placement": {"type": "random", "seed": 4}, "run": {"end_time": 8.0}}
+SHEARED_DISCS = SHEARED_SIMPLY | {
+    "system": {"dimension": 2, "box": [60.0, 12.0], "boundary": ["periodic"] * 2, "shear": {"rate": 0.5}},
+    "placement": {"type": "random", "seed": 4}, "particles": [{"name": "disc", "count": 300, "temperature": 1.0, "radius": 0.5}]}
+
+
+@pytest.mark.parametrize("deck", [SHEARED, SHEARED_SIMPLY, SHEARED_THIN, SHEARED_DISCS])
+def test_shear_on_ranks_at_all_vector_widths_and_after_a_kill(deck, killer, tmp_path):
+    plain = tmp_path / "plain"
+    output = ["output.events=true", "output.checkpoint_wall=\"0\"", "output.pressure_tensor_interval=0.25", "output.sample_start=0.5"]
+    deck = write_deck(tmp_path, toml_text(deck))
+    run(deck, plain, output)
+    found = summary(plain)
+    assert found["events"]["sphere_sphere"] > 1000 and found["energy"]["max_abs_error"] < 1e-12 * found["energy"]["reference"]
+    expect_same_anywhere(deck, output, plain, killer, (2, 3, 4))

@@ -29,7 +29,10 @@ struct ScanSetting {
   double growth = 0;            ///< contact distances are multiplied by 1 + growth·t
   std::uint32_t slot_mask = 0;  ///< selects the slot of a candidate (Packing)
   int slot_bits = 0, field_bits = 0;
-  bool plain = true;                      ///< one diameter, no acceleration, no growth
+  bool plain = true;                      ///< one diameter, no acceleration, no growth, no shear
+  bool sheared = false;                   ///< otherwise plain, but the box is sheared
+  bool slides = false;                    ///< the box is sheared
+  double tilt = 0, slide = 0;             ///< of the image above, at time 0, along the first axis (Offset)
   const ScanSurface* surfaces = nullptr;  ///< for scan_steps: the core and the steps, from the inside out
   unsigned surface_count = 0;
 };
@@ -84,8 +87,11 @@ struct NearTask {
   const std::uint32_t* next;  ///< by line: the next line of the same cell, or kEmpty
   const CellView* view[3];    ///< along each axis
   unsigned views[3];
-  float scale[3];  ///< length of 1/1024 of a cell, by axis
-  float limit_squared;
+  float scale[3];       ///< length of 1/1024 of a cell, by axis
+  float limit_squared;  ///< of the distance
+  float cells_squared;  ///< of the distance of cells
+  /// Distances are the least ones under strains from mean − half to mean + half (flow_frame.h); both are 0 without flow.
+  float mean_strain, half_strain;
 };
 
 /// A step to a row of linked cells (linked_cells.h).

@@ -67,6 +67,7 @@ CAROM_INLINE V step_times(const ScanSetting& s, V b, V d_squared, V v_squared, V
 
 enum class Pairs {
   plain,    // with ScanSetting::plain
+  sheared,  // with ScanSetting::sheared
   general,  // without
   stepped   // plain ones with ScanSetting::surfaces
 };
@@ -115,9 +116,19 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
       else
         code = load<decltype(code)>(some);
       const unsigned mask = (1u << s.field_bits) - 1, zero = 1u << (s.field_bits - 1);
+      V shift[D], boxes[D];
       for (int k = 0; k < D; ++k) {
         const auto image = (typename Width<W>::Int)((code >> (s.slot_bits + k * s.field_bits) & mask) - zero);
-        d[k] -= __builtin_convertvector(image, V) * s.edges[k];
+        boxes[k] = __builtin_convertvector(image, V);
+        shift[k] = boxes[k] * s.edges[k];
+      }
+      const bool slides = pairs == Pairs::sheared || (pairs == Pairs::general && s.slides);
+      if (slides) shift[0] += boxes[1] * s.tilt;
+      for (int k = 0; k < D; ++k) d[k] -= shift[k];
+      if (slides) {
+        const V slide = boxes[1] * s.slide;
+        d[0] -= slide * now;
+        v[0] -= slide;
       }
     }
     V b, d_squared, v_squared, cross;
@@ -140,7 +151,7 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
       time = now + step_times(s, b, d_squared, v_squared, cross, near);
       best = elementary::min(near ? none : time, best);
       return store(to, near ? -none : time);
-    } else if constexpr (pairs == Pairs::plain) {
+    } else if constexpr (pairs != Pairs::general) {
       const V c = d_squared - sigma * sigma;
       const V discriminant = v_squared * sigma * sigma - cross;
       time = now + c / (elementary::sqrt(discriminant) - b);
@@ -215,6 +226,7 @@ ScanResult scan_plain(const ScanSetting& s, const ScanTask& task) {
 
 template <int D, int W>
 ScanResult scan(const ScanSetting& s, const ScanTask& task, bool latest) {
+  if (s.sheared) return scan_blocks<D, W, false, Pairs::sheared>(s, task);
   if (!s.plain) return scan_blocks<D, W, false, Pairs::general>(s, task);
   return latest ? scan_plain<D, W, true>(s, task) : scan_plain<D, W, false>(s, task);
 }
@@ -250,10 +262,11 @@ constexpr unsigned kInts = 4;
 using Ints = Width<kInts>::Int;
 typedef float Floats __attribute__((vector_size(4 * kInts)));
 
-[[maybe_unused]] unsigned near(const NearTask& task, std::uint32_t* slots, std::int32_t* away) {
+template <bool sheared>
+unsigned near_spheres(const NearTask& task, std::uint32_t* slots, std::int32_t* away) {
   const Floats scale_x = Floats{} + task.scale[0], scale_y = Floats{} + task.scale[1],
                scale_z = Floats{} + task.scale[2], limit = Floats{} + task.limit_squared;
-  const float limit_squared = task.limit_squared;
+  const float limit_squared = task.cells_squared;
   unsigned found = 0;
   struct Place {  // a line, and the corner of its cell as seen from the sphere
     std::uint32_t line;
@@ -265,9 +278,15 @@ typedef float Floats __attribute__((vector_size(4 * kInts)));
     unsigned inside = 0;
     for (unsigned first = 0; first < 8; first += kInts) {
       const Ints place = load<Ints>(line.place + first), slot = load<Ints>(line.slot + first);
-      const Floats x = __builtin_convertvector(place & 1023, Floats) * scale_x + at.x;
+      Floats x = __builtin_convertvector(place & 1023, Floats) * scale_x + at.x;
       const Floats y = __builtin_convertvector(place >> 10 & 1023, Floats) * scale_y + at.y;
       const Floats z = __builtin_convertvector(place >> 20, Floats) * scale_z + at.z;
+      if constexpr (sheared) {
+        x += task.mean_strain * y;
+        x = x < 0.0f ? -x : x;
+        x -= task.half_strain * (y < 0.0f ? -y : y);
+        x = x < 0.0f ? Floats{} : x;
+      }
       inside |= bits((x * x + y * y + z * z < limit) & (slot != -1)) << first;
     }
     return inside;
@@ -310,6 +329,10 @@ typedef float Floats __attribute__((vector_size(4 * kInts)));
   }
   flush();
   return found;
+}
+
+[[maybe_unused]] unsigned near(const NearTask& task, std::uint32_t* slots, std::int32_t* away) {
+  return task.half_strain == 0 ? near_spheres<false>(task, slots, away) : near_spheres<true>(task, slots, away);
 }
 
 [[maybe_unused]] unsigned compare(const std::uint32_t* list, unsigned length, const std::uint32_t* candidates,

@@ -208,7 +208,9 @@ class Trajectory:
 
     def unwrapped(self, frame):
         """Unwrapped centres, continuous across periodic boundaries, (N, D) [length]."""
-        return self.position(frame) + self._read("image", frame) * self.edges(frame)
+        with reading(self.path):
+            cell = self._group["box/edges/value"][frame][: self.dimension, : self.dimension]
+        return self.position(frame) + self._read("image", frame) @ cell
 
     def edges(self, frame=0):
         """Edge lengths of the box [length]."""

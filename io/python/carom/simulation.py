@@ -405,7 +405,7 @@ class Simulation:
     @property
     def means(self):
         """Means over time with their standard errors, up to now: ["pressure"]["mean"], ["standard_error"], ["independent_samples"]; also
-        of temperature, potential, collision_rate, mean_free_time and mean_free_path. Each step, or epoch of free flight, is a sample. A
+        of temperature, potential, collision_rate, mean_free_time and mean_free_path, and in a sheared box of shear_stress. Each step, or epoch of free flight, is a sample. A
         standard error is NaN if there are fewer than eight independent blocks of samples; ["needed_time"] is then the time to which the
         run must go at least, at the correlations seen so far."""
         return self._session.means()
@@ -494,7 +494,9 @@ class Simulation:
     @property
     def unwrapped(self):
         """Unwrapped centres, continuous across periodic boundaries, (N, D) [length]; a new array."""
-        return self.position + self.image * np.array(self.box)
+        cell = np.diag(np.array(self.box, float))
+        cell[1, 0] = self.tilt
+        return self.position + self.image @ cell
 
     mass = property(lambda self: self._session.constant("mass"), doc="Masses, (N,) [mass]; a view.")
     radius = property(lambda self: self._session.constant("radius"), doc="Radii of the hard cores, (N,) [length]; a view.")
@@ -502,6 +504,12 @@ class Simulation:
     species = property(lambda self: self._session.constant("species"), doc="Indices into species_names, (N,); a view.")
     species_names = property(lambda self: self._session.species, doc="The names of the species.")
     box = property(lambda self: self._table("system").get("box", [1.0] * self._table("system")["dimension"]), doc="Edges of the box [length].")
+    shear_rate = property(lambda self: self._table("system").get("shear", {"rate": 0.0})["rate"],
+                          lambda self, rate: self._session.set("shear", {"rate": float(rate)}),
+                          doc="The rate of Lees-Edwards boundaries: the velocity of the flow along x, divided by y [1/time]. Set it between two "
+                              "runs; 0 ends the flow.")
+    tilt = property(lambda self: self._session.tilt, lambda self, tilt: self._session.set("shear", {"rate": self.shear_rate, "tilt": float(tilt)}),
+                    doc="Where the image of the box above is along x, between 0 and the edge [length]. A flow changes it.")
     steps = property(lambda self: self._session.tables("step"), doc="The steps of pairs, as dictionaries of their options.")
     contacts = property(lambda self: self._session.tables("contact"), doc="The laws of contacts, as dictionaries of their options.")
     bath = property(lambda self: next(iter(self._session.tables("bath")), None),

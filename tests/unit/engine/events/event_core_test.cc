@@ -37,7 +37,7 @@ std::vector<Hit> obvious_run(const Box<D>& box, Particles<D> p, const Vec<D>& g,
   for (;;) {
     double best = end - now;
     Hit next{};
-    Vec<D> best_shift = Vec<D>::Zero();
+    Offset<D> best_offset;
     for (int i = 0; i < n; ++i) {
       for (int j = i + 1; j < n; ++j) {
         const double sigma = p.radius[i] + p.radius[j];
@@ -50,11 +50,17 @@ std::vector<Hit> obvious_run(const Box<D>& box, Particles<D> p, const Vec<D>& g,
             allowed = allowed && (image[k] == 0 || box.periodic(k));
           }
           if (!allowed) continue;
-          const Vec<D> d = p.x[i] - p.x[j] + box.shift(image), v = p.v[i] - p.v[j];
+          if (box.sheared())  // where the images of a row are
+            image[0] -= static_cast<int>(std::nearbyint(
+                (p.x[i][0] - p.x[j][0] + image[1] * (box.tilt + now * box.slide())) / box.edges[0]));
+          const Offset<D> offset = box.offset(image);
+          Vec<D> d = p.x[i] - p.x[j] + offset.start, v = p.v[i] - p.v[j];
+          d[0] += now * offset.slide;
+          v[0] += offset.slide;
           const double b = d.dot(v), c = d.squaredNorm() - sigma * sigma, disc = b * b - v.squaredNorm() * c;
           if (b >= 0 || disc <= 0) continue;
           const double s = std::max(0.0, c / (std::sqrt(disc) - b));
-          if (s < best) best = s, next = {now + s, EventKind::pair, Id(i), Id(j)}, best_shift = box.shift(image);
+          if (s < best) best = s, next = {now + s, EventKind::pair, Id(i), Id(j)}, best_offset = offset;
         }
       }
       for (int k = 0; k < D; ++k)
@@ -82,8 +88,10 @@ std::vector<Hit> obvious_run(const Box<D>& box, Particles<D> p, const Vec<D>& g,
       double& v = p.v[next.lo][next.hi / 2];
       v = 2 * (next.hi % 2) * edge_velocity(box, static_cast<int>(next.hi / 2)) - v;
     } else {
-      const Vec<D> d = p.x[next.lo] - p.x[next.hi] + best_shift;
-      const double f = collision_factor<D>(d, p.v[next.lo] - p.v[next.hi], p.mass[next.lo], p.mass[next.hi]);
+      Vec<D> d = p.x[next.lo] - p.x[next.hi] + best_offset.start, v = p.v[next.lo] - p.v[next.hi];
+      d[0] += now * best_offset.slide;
+      v[0] += best_offset.slide;
+      const double f = collision_factor<D>(d, v, p.mass[next.lo], p.mass[next.hi]);
       p.v[next.lo] += f / p.mass[next.lo] * d;
       p.v[next.hi] -= f / p.mass[next.hi] * d;
     }
@@ -173,6 +181,22 @@ TEST(EventCore, FindsThemWhereWallsMove) {
     deep->box.add({.name = "y+", .velocity = -0.1});
     expect_same_events<3>(*deep, Vec<3>(0, 0, -0.5), 4, 20);
   }
+}
+
+/// Spheres of a random system in a sheared box, with the velocities of its flow.
+template <int D>
+std::unique_ptr<System<D>> sheared(std::unique_ptr<System<D>> system, double rate) {
+  system->box.shear_rate = rate;
+  Particles<D>& p = system->particles;
+  for (std::size_t i = 0; i < p.size(); ++i) p.v[i][0] += system->box.flow(p.x[i]);
+  return system;
+}
+
+TEST(EventCore, FindsThemInAShearedBox) {
+  expect_same_events<2>(*sheared(random_spheres<2>(8, 4, {P, P}, 1), 1.0), Vec<2>::Zero(), 3, 9);
+  expect_same_events<2>(*sheared(random_spheres<2>(7, 5, {P, P}, 2), -0.6), Vec<2>::Zero(), 8, 9);
+  expect_same_events<3>(*sheared(random_spheres<3>(10, 2.8, {P, P, P}, 5), 0.8), Vec<3>::Zero(), 2, 9);
+  expect_same_events<3>(*sheared(random_spheres<3>(10, 3, {P, P, W}, 6), -1.5), Vec<3>::Zero(), 2, 9);
 }
 
 TEST(EventCore, TwoSpheresInADiluteBoxMeetThroughAFarImage) {

@@ -42,6 +42,9 @@ struct Searched {
           image[k] = digits % 5 - 2;
           there = there && (image[k] == 0 || system->box.periodic(k));
         }
+        // Where the images of a row are.
+        const Box<D>& box = system->box;
+        image[0] -= static_cast<int>(std::nearbyint(image[1] * (box.tilt + kStart * box.slide()) / box.edges[0]));
         if (there) visit(j, image);
       }
   }
@@ -52,7 +55,7 @@ struct Searched {
     flights.visit_lone_events(i, flights[i], [&](double time, EventKind, Id) { first = std::min(first, time); });
     seen = first;
     for_all_others(i, [&](Slot j, const Image<D>& image) {
-      const double time = flights.pair_contact(i, j, system->box.shift(image));
+      const double time = flights.pair_contact(i, j, system->box.offset(image));
       first = std::min(first, time);
       if (time < queue[i].update && time <= queue[j].due()) seen = std::min(seen, time);
     });
@@ -69,7 +72,7 @@ struct Searched {
     for (Slot i = 0; i < flights.size(); ++i) {
       flights.visit_lone_events(i, flights[i], [&](double time, EventKind, Id) { first = std::min(first, time); });
       for_all_others(i, [&](Slot j, const Image<D>& image) {
-        if (i < j) first = std::min(first, flights.pair_contact(i, j, system->box.shift(image)));
+        if (i < j) first = std::min(first, flights.pair_contact(i, j, system->box.offset(image)));
       });
     }
     return first;
@@ -140,6 +143,16 @@ TEST(EventSearch, PlansTheContactsThatTryingEverythingFinds) {
   }
 }
 
+/// The spheres of a random system, with the velocities of the flow in a sheared box.
+template <int D>
+std::unique_ptr<System<D>> sheared(std::unique_ptr<System<D>> system, double rate) {
+  system->box.shear_rate = rate;
+  Particles<D>& p = system->particles;
+  for (std::size_t i = 0; i < p.size(); ++i) p.v[i][0] += system->box.flow(p.x[i]);
+  system->box.pass(Searched<D>::kStart, 0, -Searched<D>::kStart);  // no tilt when the search starts
+  return system;
+}
+
 /// Executes the queue like EventCore: each contact is the first one that brute force finds.
 template <int D>
 void expect_contacts(Searched<D>& s, int contacts) {
@@ -161,7 +174,7 @@ void expect_contacts(Searched<D>& s, int contacts) {
         s.search.plan(i, now);
       } else {
         const Slot j = s.flights.packing().slot(a.partner);
-        s.flights.collide(i, j, s.system->box.shift(s.flights.packing().image(a.partner)), now, 0);
+        s.flights.collide(i, j, s.system->box.offset(s.flights.packing().image(a.partner)), now, 0);
         ++s.queue[j].version;
         s.search.plan_two(i, j, now);
       }
@@ -180,6 +193,22 @@ TEST(EventSearch, PlansAnewAfterContacts) {
     expect_contacts(walled, 30);
     Searched<2> field(random_system<2>(30, {7, 9}, {P, W}, 0.3, 0.5, 9), Vec<2>(0, -1), method);
     expect_contacts(field, 30);
+  }
+}
+
+TEST(EventSearch, PlansContactsInAShearedBox) {
+  const auto lists = SearchOptions::Method::automatic;
+  for (const double rate : {0.7, -1.3}) {
+    Searched<2> flat(sheared(random_system<2>(40, {9, 9}, {P, P}, 0.2, 0.5, 1), rate), Vec<2>::Zero(), lists);
+    expect_nothing_missed(flat);
+    Searched<3> equal(sheared(random_system<3>(60, {6, 5, 6}, {P, P, P}, 0.4, 0.4, 2), rate), Vec<3>::Zero(), lists);
+    expect_nothing_missed(equal);
+    Searched<3> walled(sheared(random_system<3>(60, {6, 5, 6}, {P, P, W}, 0.3, 0.5, 2), rate), Vec<3>(0, 0, -1), lists);
+    expect_nothing_missed(walled);
+    Searched<2> many(sheared(random_system<2>(30, {9, 7}, {P, P}, 0.4, 0.4, 7), rate), Vec<2>::Zero(), lists);
+    expect_contacts(many, 30);
+    Searched<3> sizes(sheared(random_system<3>(30, {5, 4, 4}, {P, P, W}, 0.3, 0.5, 8), rate), Vec<3>::Zero(), lists);
+    expect_contacts(sizes, 30);
   }
 }
 

@@ -230,7 +230,7 @@ TEST(Ownership, AGhostMeetsWhatIsAsNearAsBothCanCome) {
       for (const double part : {1 - 1e-9, 1 + 1e-9}) {
         Record<3> ghost = r;
         ghost.x = there.x + part * (reach + way) * Vec<3>(0.6, 0, 0.8);
-        EXPECT_EQ(here.may_meet(ghost, j, Vec<3>::Zero(), end), part < 1) << id;
+        EXPECT_EQ(here.may_meet(ghost, j, {}, end), part < 1) << id;
       }
     }
     EXPECT_GT(somewhere, 50u);

@@ -105,6 +105,15 @@ TEST(RegionCells, FindSpheresThatComeAndGo) {
   expect_found_as_they_come_and_go<3>({{5, 1.3, 4}, {O, P, W}}, 4);
 }
 
+TEST(RegionCells, FindSpheresInATiltedLattice) {
+  for (const double tilt : {0.01, 2.3, 4.6}) {
+    expect_found_as_they_come_and_go<2>({.edges = {9, 7}, .boundary = {P, P}, .tilt = tilt}, 1);
+    expect_found_as_they_come_and_go<2>({.edges = {5, 1.5}, .boundary = {P, P}, .tilt = tilt}, 2);
+    expect_found_as_they_come_and_go<3>({.edges = {5, 6, 4}, .boundary = {P, P, P}, .tilt = tilt}, 3);
+    expect_found_as_they_come_and_go<3>({.edges = {5, 1.3, 4}, .boundary = {P, P, W}, .tilt = tilt}, 4);
+  }
+}
+
 TEST(RegionCells, AreStoredAroundGivenPlacesOnly) {
   Centres<3> c({{30, 30, 4}, {P, W, P}}, 300, 5);
   c.cells.confine(std::vector<Vec<3>>{{1, 1, 1}, {2, 2, 3}});
@@ -171,6 +180,65 @@ TEST(CellGrid, RangesCoverAllCellsAroundOnce) {
     EXPECT_EQ(found_half, half);
   }
   EXPECT_EQ(centre, Cell<3>{});
+}
+
+/// In a tilted lattice the pairs of points within reach are in cells that a range visits, and with halved ranges each
+/// pair is visited once.
+template <int D>
+void expect_pairs_once(const Vec<D>& edges, double tilt) {
+  Box<D> box;
+  box.edges = edges;
+  box.boundary.fill(P);
+  box.tilt = tilt;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(-1, 2);
+  std::vector<Vec<D>> x(60);
+  for (Vec<D>& each : x)
+    for (int k = 0; k < D; ++k) each[k] = uniform(random) * edges[k];
+  const CellGrid<D> grid(box, 0.9, {x.size(), Vec<D>::Zero(), box.edges});
+  using Pair = std::tuple<std::size_t, std::size_t, Image<D>>;
+  std::multiset<Pair> all, found, found_half;
+  for (std::size_t i = 0; i < x.size(); ++i)
+    for (std::size_t j = 0; j < x.size(); ++j)
+      for (int code = 0; code < std::pow(9, D); ++code) {
+        Image<D> image;
+        for (int k = 0, digits = code; k < D; ++k, digits /= 9) image[k] = digits % 9 - 4;
+        image[0] -= static_cast<int>(std::nearbyint(image[1] * tilt / edges[0]));  // where the images of a row are
+        if ((i != j || image != Image<D>{}) && (x[i] - x[j] + box.shift(image)).norm() < 0.9) all.insert({i, j, image});
+      }
+  for (std::size_t i = 0; i < x.size(); ++i)
+    for (const bool half : {false, true})
+      grid.for_each_range(grid.cell(x[i]), grid.range(0.9), half,
+                          [&](std::size_t first, std::size_t end, const Image<D>& boxes) {
+                            for (std::size_t j = 0; j < x.size(); ++j) {
+                              const Cell<D> cell = grid.cell(x[j]);
+                              if (grid.index(cell) < first || grid.index(cell) >= end) continue;
+                              Image<D> image = grid.boxes(cell);
+                              for (int k = 0; k < D; ++k) image[k] -= boxes[k];
+                              if (!((x[i] - x[j] + box.shift(image)).norm() < 0.9)) continue;
+                              const Cell<D> centre = grid.cell(x[i]);
+                              const bool own = grid.index(cell) == grid.index(centre) && boxes == grid.boxes(centre);
+                              if (i == j && image == Image<D>{}) continue;
+                              if (!half) found.insert({i, j, image});
+                              if (half && (!own || i < j)) found_half.insert({i, j, image});
+                            }
+                          });
+  EXPECT_EQ(found, all);
+  std::multiset<Pair> both = found_half;
+  for (auto [i, j, image] : found_half) {
+    for (auto& k : image) k = -k;
+    both.insert({j, i, image});
+  }
+  EXPECT_EQ(both, all);
+  EXPECT_GT(all.size(), 100u);
+}
+
+TEST(CellGrid, FindsPairsInATiltedLatticeOnce) {
+  for (const double tilt : {0.3, 1.7, 2.9}) {
+    expect_pairs_once<2>({3, 4}, tilt);
+    expect_pairs_once<2>({5, 1}, tilt);
+    expect_pairs_once<3>({3, 3, 2}, tilt);
+  }
 }
 
 }  // namespace

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Sheared boxes in Python."""
+
+import numpy as np
+import pytest
+
+import carom
+
+
+def fluid(rate, **more):
+    sim = carom.Simulation(dimension=3, boundary="periodic", **more)
+    sim.add_particles(count=256, temperature=1.0, radius=0.5)
+    sim.place("fcc", packing_fraction=0.3, seed=1)
+    sim.shear_rate = rate
+    sim.integrator("free-flight", step=0.9)
+    return sim
+
+
+def test_a_flow_begins_and_ends():
+    sim = fluid(1.0)
+    rows = []
+    sim.run(time=2.0, every=0.5, callback=lambda s: rows.append((s.time, s.shear_stress, s.work, s.tilt, s.unwrapped)))
+    edge, (times, stress, work, tilt, places) = sim.box[0], zip(*rows)
+    assert sim.shear_rate == 1 and np.allclose(np.mod(np.array(times) * edge, edge), tilt)
+    assert np.allclose(np.diff(work), np.array(stress[1:]) * 0.5 * edge**3) and min(stress[1:]) > 0
+    assert sim.means["shear_stress"]["mean"] == pytest.approx(work[-1] / (2 * edge**3))
+    moved = np.diff(places, axis=0)
+    moved[..., 0] -= 0.25 * (np.array(places[1:]) + np.array(places[:-1]))[..., 1]
+    assert np.abs(moved).max() < 3 and sim.energy_error < 1e-12
+
+    hot, tilted = sim.temperature, sim.tilt
+    sim.shear_rate = 0
+    assert sim.tilt == tilted > 0
+    sim.run(time=1.0)
+    assert sim.temperature == pytest.approx(hot, rel=1e-13) and sim.tilt == tilted and sim.work == 0
+    sim.integrator("psa", step=0.01)
+    with pytest.raises(carom.UsageError, match="'psa' knows no shear yet"):
+        sim.run(time=1.0)
+    with pytest.raises(carom.UsageError, match="tilt is not between 0 and the edge"):
+        sim.tilt = -1
+
+
+def test_files_of_a_box_that_was_sheared_before(tmp_path):
+    """A run from a tilted lattice writes a deck and files that have the tilt, and goes on."""
+    sim = fluid(0.7)
+    sim.run(time=1.1)
+    sim.shear_rate = 0
+    tilted = sim.tilt
+    sim.output(tmp_path / "after", frame_interval=0.5, thermo_interval=0.5)
+    sim.run(time=1.0)
+    run = carom.open(tmp_path / "after")
+    assert f"tilt = {tilted!r}" in (tmp_path / "after/deck.toml").read_text()
+    assert run.summary["max_overlap"] < 1e-11 and np.allclose(run.frames[-1].unwrapped, sim.unwrapped)
+    sim.run(time=2.0)
+    assert sim.energy_error < 1e-12
+
+
+def test_the_deck_of_a_sheared_simulation(tmp_path):
+    sim = fluid(-0.4)
+    sim.write_deck(tmp_path / "sheared.toml")
+    again = carom.Simulation.from_deck(tmp_path / "sheared.toml")
+    assert again.shear_rate == -0.4
