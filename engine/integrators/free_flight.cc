@@ -63,8 +63,9 @@ class FreeFlight : public Integrator<D> {
       for (std::size_t i = 0; boxes != 0 && i < particles.image.size(); ++i) {
         const std::int64_t x = particles.image[i][0] + std::int64_t{boxes} * particles.image[i][1];
         if (std::abs(x) > std::numeric_limits<std::int32_t>::max())
-          throw Error(Failure::numerical, "the flow has carried a particle across the periodic box more often than 32 "
-                                          "bits can count; end the run earlier, or start a new one from its last state");
+          throw Error(Failure::numerical,
+                      "the flow has carried a particle across the periodic box more often than 32 "
+                      "bits can count; end the run earlier, or start a new one from its last state");
         particles.image[i][0] = static_cast<std::int32_t>(x);
       }
     };

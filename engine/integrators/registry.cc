@@ -40,7 +40,8 @@ std::string IntegratorInfo::refusal_of_shear(const System<D>& system, bool fixed
   const Box<D>& box = system.box;
   if (!std::isfinite(box.shear_rate)) return "the rate of 'shear' is not finite; give a number";
   if (!box.sheared()) return "";
-  if (!shear) return std::string("'").append(name).append("' knows no shear yet; take free-flight, or leave 'shear' out");
+  if (!shear)
+    return std::string("'").append(name).append("' knows no shear yet; take free-flight, or leave 'shear' out");
   for (const int k : {0, 1})
     if (!box.periodic(k))
       return "'shear' needs an axis " + std::to_string(k) +

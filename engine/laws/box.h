@@ -215,7 +215,8 @@ struct Box {
     for (int k = 0; k < D; ++k)
       if (periodic(k) && !(std::abs(d[k]) <= 0.5 * edges[k]))  // else the quotient rounds to zero
         image[k] = -static_cast<std::int32_t>(std::nearbyint(d[k] / edges[k]));
-    if (tilt != 0 && image[1] != 0) image[0] = -static_cast<std::int32_t>(std::nearbyint((d[0] + image[1] * tilt) / edges[0]));
+    if (tilt != 0 && image[1] != 0)
+      image[0] = -static_cast<std::int32_t>(std::nearbyint((d[0] + image[1] * tilt) / edges[0]));
     return image;
   }
 

@@ -69,13 +69,19 @@ struct PackedExchange {
 
   PackedExchange() = default;
   PackedExchange(EventKind kind, const Exchange& all)
-      : first(kind == EventKind::pair ? all.virial : all.impulse), lost(all.dissipated + all.stored - all.heat), shear(all.shear) {}
+      : first(kind == EventKind::pair ? all.virial : all.impulse),
+        lost(all.dissipated + all.stored - all.heat),
+        shear(all.shear) {}
   /// `number`: that of the wall, if it is one.
   template <int D>
   Exchange unpacked(EventKind kind, PairEvent event, Id number, const Box<D>& box, double time) const {
     if (kind == EventKind::pair) {
       const bool crosses = event == PairEvent::enter || event == PairEvent::leave;
-      return {.virial = first, .dissipated = crosses ? 0 : lost, .stored = crosses ? lost : 0, .shear = shear, .event = event};
+      return {.virial = first,
+              .dissipated = crosses ? 0 : lost,
+              .stored = crosses ? lost : 0,
+              .shear = shear,
+              .event = event};
     }
     if (kind == EventKind::kick) return {.heat = -lost, .shear = shear};
     const Wall<D> wall = box.wall(number);

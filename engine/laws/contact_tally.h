@@ -116,10 +116,10 @@ struct ContactTally : OverlapTally {
   ExactSum collision_virial;        ///< Σ d·impulse over pair collisions [mass·length²/time]
   ExactSum dissipated;              ///< energy lost at contacts [energy]
   ExactSum work;                    ///< work done on spheres by moving walls [energy]
-  ExactSum shear;                   ///< energy that the flow of a sheared box gave to the motion relative to it [energy]
-  ExactSum heat;                    ///< energy that spheres got from walls and baths with a temperature [energy]
-  StepTally steps;                  ///< events of pairs at steps
-  std::vector<WallTally> walls;     ///< by number, as far as walls were hit
+  ExactSum shear;                ///< energy that the flow of a sheared box gave to the motion relative to it [energy]
+  ExactSum heat;                 ///< energy that spheres got from walls and baths with a temperature [energy]
+  StepTally steps;               ///< events of pairs at steps
+  std::vector<WallTally> walls;  ///< by number, as far as walls were hit
 
   /// What kinetic and potential energy have lost to the surroundings: H + drained() is conserved.
   double drained() const { return dissipated.value() - work.value() - shear.value() - heat.value(); }
@@ -150,11 +150,10 @@ struct ContactTally : OverlapTally {
   void add_wall(Id number, const Exchange& exchange) {
     ++sphere_wall;
     wall(number).add(exchange);
-    for (const auto& [sum, term] :
-         {std::pair{&work, exchange.work},
-          {&heat, exchange.heat},
-          {&dissipated, exchange.dissipated},
-          {&shear, exchange.shear}})
+    for (const auto& [sum, term] : {std::pair{&work, exchange.work},
+                                    {&heat, exchange.heat},
+                                    {&dissipated, exchange.dissipated},
+                                    {&shear, exchange.shear}})
       if (term != 0) sum->add(term);
   }
   void add(const ContactTally& other) {

@@ -55,8 +55,8 @@ struct System {
   /// Counts the fixed particles. Call when the particles are complete, before they are divided among ranks. Collective.
   void count_moving();
 
-  /// Whether the total momentum is conserved: no walls, no shear, no kicks or friction of a bath, no fixed particles, no
-  /// external field.
+  /// Whether the total momentum is conserved: no walls, no shear, no kicks or friction of a bath, no fixed particles,
+  /// no external field.
   bool keeps_momentum() const {
     return !box.has_walls() && !box.sheared() && box.bath.keeps_momentum() && !has_fixed() &&
            std::ranges::all_of(interactions, [](const auto& term) { return term->keeps_momentum(); });

@@ -404,8 +404,7 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
   shot.pressure = pressure_of(account_.virial + collisions, system_.box, shot.time);
   const double work = statistics_.counters.shear.value();
   if (system_.box.sheared() && account_.last_row >= 0 && shot.time > account_.last_row)
-    shot.shear_stress =
-        stress_of(work - account_.last_row_shear, system_.box) / (shot.time - account_.last_row);
+    shot.shear_stress = stress_of(work - account_.last_row_shear, system_.box) / (shot.time - account_.last_row);
   shot.max_energy_error = statistics_.max_energy_error;
   // Only whole intervals count: the first row has had no collisions, the last one may be early.
   if (row && waits() && !transient_end_ && rows_.due() <= now && shot.time > statistics_.start_time)

@@ -147,14 +147,14 @@ class Monitor {
   };
   /// The measurements that a continued run needs.
   struct Account {
-    double last_frame = -1, last_row = -1;      // when they were last shown; −1: never
+    double last_frame = -1, last_row = -1;           // when they were last shown; −1: never
     double last_row_virial = 0, last_row_shear = 0;  // collision virial and work of shear up to the last row
-    double energy = 0;                          // H + dissipated − work − heat at the last measurement
-    double magnitude = 0, virial = 0;           // K + Σ|V| and 2K + Σ d·F at the last measurement
-    double virial_time = 0;                     // ∫ (2K + Σ d·F) dt
-    double speed = 0, path = 0;                 // mean |v| at the last slab's end; ∫ mean |v| dt
-    double first_energy = 0, first_shadow = 0;  // H₁ and S_h,1
-    Sampled sampled_virial, sampled_shear;      // of collisions; the work of shear
+    double energy = 0;                               // H + dissipated − work − heat at the last measurement
+    double magnitude = 0, virial = 0;                // K + Σ|V| and 2K + Σ d·F at the last measurement
+    double virial_time = 0;                          // ∫ (2K + Σ d·F) dt
+    double speed = 0, path = 0;                      // mean |v| at the last slab's end; ∫ mean |v| dt
+    double first_energy = 0, first_shadow = 0;       // H₁ and S_h,1
+    Sampled sampled_virial, sampled_shear;           // of collisions; the work of shear
     std::uint64_t sampled_collisions = 0;
     std::array<double, D> first_momentum{};
   } account_;

@@ -99,7 +99,7 @@ ObservableInfo pressure_tensor() {
       .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.7",
       .in_2d = maker<PressureTensor, 2>(complete_pressure_tensor<2>),
       .in_3d = maker<PressureTensor, 3>(complete_pressure_tensor<3>),
-          .sheared = true};
+      .sheared = true};
 }
 
 }  // namespace carom::observable

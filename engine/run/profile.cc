@@ -202,7 +202,7 @@ ObservableInfo profile() {
       .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.12",
       .in_2d = maker<Profile, 2>(complete_profile<2>),
       .in_3d = maker<Profile, 3>(complete_profile<3>),
-          .sheared = true};
+      .sheared = true};
 }
 
 }  // namespace carom::observable

@@ -389,7 +389,7 @@ ObservableInfo rdf() {
       .source = "Allen, Tildesley, Computer Simulation of Liquids, 2nd ed., section 2.6",
       .in_2d = maker<RadialDistribution, 2>(complete_gr<2>),
       .in_3d = maker<RadialDistribution, 3>(complete_gr<3>),
-          .sheared = true};
+      .sheared = true};
 }
 
 }  // namespace observable

@@ -86,7 +86,8 @@ void check_rest_speeds(const System<D>& system) {
 /// count_moving() on.
 template <int D>
 void check_laws(const System<D>& system, const IntegratorInfo& info) {
-  if (const std::string no = info.refusal_of_shear(system, system.has_fixed()); !no.empty()) throw Error(Failure::deck, no);
+  if (const std::string no = info.refusal_of_shear(system, system.has_fixed()); !no.empty())
+    throw Error(Failure::deck, no);
   if (const std::string no = info.refusal_of_steps(); !no.empty() && !system.box.steps.empty())
     throw Error(Failure::deck, no);
   if (info.stepping && std::isfinite(system.box.steps.least_climb()) && !system.box.contacts.elastic())

@@ -37,8 +37,8 @@ struct FlowFrame {
     if (rate != 0) x[0] -= strain(t) * x[1];
     return x;
   }
-  /// The distance in these coordinates within which all points are that come as near as `reach`. The shear by e stretches
-  /// lengths by at most its largest singular value, |e|/2 + √(1 + e²/4).
+  /// The distance in these coordinates within which all points are that come as near as `reach`. The shear by e
+  /// stretches lengths by at most its largest singular value, |e|/2 + √(1 + e²/4).
   double widened(double reach) const {
     if (rate == 0) return reach;
     const double e = 0.5 * std::max(std::abs(from), std::abs(to));

@@ -53,9 +53,9 @@ void SkinLists<D>::build(std::size_t n, const std::function<Vec<D>(Slot)>& place
     const double all =
         static_cast<double>(members[o]) * static_cast<double>(extent.particles) / std::max(static_cast<double>(n), 1.0);
     const double farthest = largest_ + largest + 2 * (skin_ + max_displacement);
-    levels_.push_back({largest, RegionCells<D>(box_, packing_, kernels_, extent, all,
-                                               flow_.widened(2 * (std::max(largest, 1e-300) + skin_)),
-                                               flow_.widened(farthest))});
+    levels_.push_back(
+        {largest, RegionCells<D>(box_, packing_, kernels_, extent, all,
+                                 flow_.widened(2 * (std::max(largest, 1e-300) + skin_)), flow_.widened(farthest))});
     RegionCells<D>& cells = levels_.back().cells;
     if (n < extent.particles) cells.confine(places);
     cells.clear();

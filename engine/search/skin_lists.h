@@ -30,7 +30,8 @@ class SkinLists {
   /// first is used. Spheres admitted later have reaches of at most `largest`. The tilt of `box` is that at the time of
   /// the frame.
   SkinLists(const Box<D>& box, const FlowFrame& flow, const Packing<D>& packing, const ScanKernels& kernels,
-            std::span<const double> reach, bool equal, double largest, double skin, PageVector<NextEvent<D>>& next_events);
+            std::span<const double> reach, bool equal, double largest, double skin,
+            PageVector<NextEvent<D>>& next_events);
 
   double skin() const { return skin_; }
   const FlowFrame& flow() const { return flow_; }
@@ -58,8 +59,8 @@ class SkinLists {
   void admit(Slot i, const Vec<D>& x, std::span<const double> reach);
   /// Removes a sphere.
   void dismiss(Slot i);
-  /// The sphere is now at x: renews its list if it is farther than `room` from the centre of its region; returns whether
-  /// it was.
+  /// The sphere is now at x: renews its list if it is farther than `room` from the centre of its region; returns
+  /// whether it was.
   bool move(Slot i, const Vec<D>& x, double room, double now);
   /// Starts to fetch the list of a sphere, at most as far as a typical list of equal spheres extends.
   void prefetch(const NextEvent<D>& a) const {

@@ -10,10 +10,10 @@
 
 namespace carom {
 
-/// The strain of a sheared box in a slab of free flight. Lists of neighbours hold for a slab: with a longer one they are
-/// longer, with a shorter one they are made more often (engine/search/flow_frame.h). With 10,976 spheres at a packing
-/// fraction of 0.26, restitution 0.9 and rate 1, strains of 0.25, 0.5 and 1 gave 170, 191 and 179 thousand collisions a
-/// second, and elastic spheres at rate 0.1 251, 240 and 246 thousand.
+/// The strain of a sheared box in a slab of free flight. Lists of neighbours hold for a slab: with a longer one they
+/// are longer, with a shorter one they are made more often (engine/search/flow_frame.h). With 10,976 spheres at a
+/// packing fraction of 0.26, restitution 0.9 and rate 1, strains of 0.25, 0.5 and 1 gave 170, 191 and 179 thousand
+/// collisions a second, and elastic spheres at rate 0.1 251, 240 and 246 thousand.
 inline constexpr double kStrainOfSlab = 0.5;
 /// The longest slab of a sheared box, shorter for a box that is so high that its images slide far; infinite if the
 /// images do not slide.
@@ -31,8 +31,8 @@ double contact_rate(const System<D>& system);
 
 /// Forty mean free times of the fluid at this density (Enskog's theory), but at most the time in which the lightest
 /// spheres move four times the longest edge in equilibrium, and less if light or fast ones could cross more boxes than
-/// can be counted, and at most a strain of forty; rounded to two digits; 1 if nothing moves. Longer epochs lose digits, because times and unwrapped
-/// positions grow.
+/// can be counted, and at most a strain of forty; rounded to two digits; 1 if nothing moves. Longer epochs lose digits,
+/// because times and unwrapped positions grow.
 template <int D>
 double default_epoch(const System<D>& system);
 

@@ -113,7 +113,10 @@ std::vector<TableSchema> make_schema() {
          "them",
          Range::positive},
         boundary_key(),
-        {"shear", Parameter::Type::table, "none", "-",
+        {"shear",
+         Parameter::Type::table,
+         "none",
+         "-",
          "a flow along x whose velocity increases with y, by Lees–Edwards boundaries: the images of the box above and "
          "below slide along x. All velocities, given and written, are relative to this flow",
          Range::any,
@@ -122,7 +125,8 @@ std::vector<TableSchema> make_schema() {
          std::numeric_limits<double>::infinity(),
          {{"rate", real, "", "1/time", "the velocity of the flow at y is rate·y"}}},
         {"tilt", real, "none", "length",
-         "where the image of the box above is along x at the start, between 0 and the edge along x, as a flow before this "
+         "where the image of the box above is along x at the start, between 0 and the edge along x, as a flow before "
+         "this "
          "run has left it"}}},
       {"contact", true, false, "the law of all contacts between two partners; contacts without one are elastic",
        contact_parameters()},

@@ -73,8 +73,8 @@ std::string write_extxyz(const TrajectoryReader& trajectory, std::span<const std
     const TrajectoryFrame f = trajectory.frame(index);
     fmt::memory_buffer text;
     const auto out = fmt::appender(text);
-    fmt::format_to(out, "{}\nLattice=\"{} 0 0 {} {} 0 0 0 {}\"", trajectory.particles(), f.edges[0], f.tilt,
-                   f.edges[1], f.edges[2]);
+    fmt::format_to(out, "{}\nLattice=\"{} 0 0 {} {} 0 0 0 {}\"", trajectory.particles(), f.edges[0], f.tilt, f.edges[1],
+                   f.edges[2]);
     fmt::format_to(
         out,
         " Properties=species:S:1:pos:R:3:velo:R:3:radius:R:1:mass:R:1:charge:R:1:image:I:3{} Time={} Step={} pbc=\"",

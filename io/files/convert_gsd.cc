@@ -62,7 +62,8 @@ void each_chunk(const TrajectoryReader& t, std::uint64_t number, const Trajector
   for (std::size_t i = 0; i < position.size(); ++i) {
     double x = f.position[i] - f.edges[i % 3] / 2;
     if (i % 3 == 0 && f.tilt != 0) {  // into the oblique box of HOOMD, around the origin
-      const double row = f.tilt * (f.position[i + 1] / f.edges[1] - 0.5), boxes = std::floor((x - row) / f.edges[0] + 0.5);
+      const double row = f.tilt * (f.position[i + 1] / f.edges[1] - 0.5),
+                   boxes = std::floor((x - row) / f.edges[0] + 0.5);
       x -= boxes * f.edges[0];
       image[i] += static_cast<std::int32_t>(boxes);
     }

@@ -143,7 +143,9 @@ std::string banner_text(const Deck& deck, std::size_t particles, int ranks) {
 std::optional<std::string> energy_warning(const Statistics& s, const IntegratorInfo& method) {
   // Errors count from the end of the first step, which may itself have the large error.
   const auto share = [](double error, double of) { return of > 0 ? error / of : 0; };
-  const double later = share(s.max_energy_error, s.energy_reference), first = share(s.first_step_error, s.energy_scale);
+  // A flow may do far more work than the energy at the start.
+  const double reference = std::max(s.energy_reference, std::abs(s.counters.shear.value()));
+  const double later = share(s.max_energy_error, reference), first = share(s.first_step_error, s.energy_scale);
   constexpr double kExactErrorBound = 1e-12;  // the bound of the exact methods, relative to the reference energy
   if (std::max(first, later) <= 1) {
     if (!method.exact || std::max(first, later) <= kExactErrorBound) return {};

@@ -61,7 +61,8 @@ const std::vector<Column<D>>& columns() {
        [](S s, int) { return s.step_length; }, "step_length", "step_length"},
       {"bonds", number, "-", "pairs inside the outermost of their steps, for each particle",  //
        [](S s, int) { return s.bonds; }, nullptr, "bonds"},
-      {"shear_stress", number, "energy/length^D", "−P_xy since the last row, from the work of the flow; 0 without shear",  //
+      {"shear_stress", number, "energy/length^D",
+       "−P_xy since the last row, from the work of the flow; 0 without shear",  //
        [](S s, int) { return s.shear_stress; }, "shear_stress", "shear_stress"}};
   return all;
 }

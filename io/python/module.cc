@@ -133,6 +133,7 @@ void bind(py::module_& module, const char* name) {
       .def("set_inertia", &S::set_inertia)
       .def("set", [](S& session, const std::string& table,
                      const py::dict& given) { session.set(table, parameters_of(table_schema(table), given)); })
+      .def("set_shear", &S::set_shear)
       .def("set_bath_temperature", &S::set_bath_temperature)
       .def("take", &S::take)
       .def("run",
@@ -155,13 +156,13 @@ void bind(py::module_& module, const char* name) {
            [](const S& session) {
              py::dict all;
              const Statistics& statistics = session.statistics();
-             const auto add = [&](const char* name, const Estimate& e) {
+             const auto add = [&](const char* of, const Estimate& e) {
                py::dict entry;
                entry["mean"] = e.mean;
                entry["standard_error"] = e.error;
                entry["independent_samples"] = e.samples;
                entry["needed_time"] = statistics.needed_time(e);
-               all[name] = entry;
+               all[of] = entry;
              };
              for (std::size_t k = 0; k < Statistics::mean_names.size(); ++k)
                add(Statistics::mean_names[k], statistics.estimate(k));

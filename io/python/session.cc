@@ -260,7 +260,6 @@ template <int D>
 void Session<D>::set(const std::string& name, Parameters given) {
   if (name == "wall") return set_wall(std::move(given));
   if (name == "contact") return add_contact(std::move(given));
-  if (name == "shear") return set_shear(std::move(given));
   if (name == "step") return add_step(std::move(given));
   if (name == "interaction") return add_force(std::move(given));
   ValueTable table = table_of(name, std::move(given));
@@ -317,13 +316,12 @@ void Session<D>::set_wall(Parameters given) {
   set_contacts(values_.list("contact"));
 }
 
-/// Shears the box with a rate, and sets the tilt if it is given; a rate of 0 ends the flow.
 template <int D>
-void Session<D>::set_shear(Parameters given) {
-  const double rate = given.real("rate");
+void Session<D>::set_shear(double rate, std::optional<double> new_tilt) {
   if (!std::isfinite(rate)) refuse("the rate of shear is not finite; give a number");
-  const double tilt = given.has("tilt") ? given.real("tilt") : box_.tilt;
-  if (!(tilt >= 0 && tilt < box_.edges[0])) refuse("the tilt is not between 0 and the edge along x");
+  const double tilt = new_tilt.value_or(box_.tilt);
+  if (!(tilt >= 0 && tilt < box_.edges[0]))
+    refuse("the tilt is not between 0 and the edge along x; add or take off edges");
   change("set the shear");
   box_.shear_rate = rate;
   box_.tilt = tilt;

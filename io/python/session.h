@@ -90,6 +90,8 @@ class Session : Observer<D> {
   /// By species; 0 or missing: homogeneous.
   const std::vector<double>& inertias() const { return box_.contacts.inertias; }
   const std::vector<std::string>& species() const { return species_; }
+  /// Shears the box with a rate, and sets the tilt if it is given; a rate of 0 ends the flow.
+  void set_shear(double rate, std::optional<double> tilt);
   /// The tilt of the lattice of images (Box), also during a run [length].
   double tilt() const { return (at_work_ ? at_work_->box : box_).tilt; }
   std::size_t size() const { return size_; }
@@ -118,7 +120,6 @@ class Session : Observer<D> {
   double present() const { return showing_ ? shot_->time : statistics().end_time; }
   void set_wall(Parameters given);
   void add_contact(Parameters given);
-  void set_shear(Parameters given);
   void note_tilt();
   void add_step(Parameters given);
   void set_pair_steps(std::vector<ValueTable> all);

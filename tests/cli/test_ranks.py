@@ -173,7 +173,8 @@ def test_steps_that_hold_chains_on_ranks_and_after_a_kill(method, killer, tmp_pa
 def test_tethers_between_the_neighbours_in_a_lattice(method, killer, tmp_path):
     repelling = {"type": "yukawa", "amplitude": 1.0, "kappa": 2.0, "cutoff": 2.0, "cut": "force-shifted", "exclude": "bonded"}
     tied = tomllib.loads(DISCS) | {
-        "title": "tethered discs", "interaction": [] if method == "free-flight" else [repelling], "system": {"dimension": 2, "boundary": ["periodic", "periodic"]},
+        "title": "tethered discs", "interaction": [] if method == "free-flight" else [repelling],
+        "system": {"dimension": 2, "boundary": ["periodic", "periodic"]},
         "particles": [{"name": "disc", "count": 144, "temperature": 1.0, "radius": 0.4}],
         "placement": {"type": "square", "packing_fraction": 0.3, "seed": 2}, "step": [{"within": 1.4, "tether": 1.7}]}
     deck, plain = write_deck(tmp_path, toml_text(tied)), tmp_path / "plain"

@@ -113,7 +113,7 @@ def test_the_other_slot(tmp_path):
     good = last.read_bytes()
     damage = {"its checksum is not that of its contents": good[:5000] + bytes([good[5000] ^ 1]) + good[5001:],
               "damaged or cut off": good[: len(good) // 2],
-              "written by a newer carom": good.replace(b"carom checkpoint 7", b"carom checkpoint 8", 1),
+              "written by a newer carom": good.replace(b"carom checkpoint 8", b"carom checkpoint 9", 1),
               "not a checkpoint of carom": b"something else"}
     for words, contents in damage.items():
         trial = tmp_path / "trial"

@@ -181,7 +181,7 @@ def test_a_killed_run_goes_on(killer, tmp_path):
 def test_a_branch_starts_with_the_tilt(tmp_path):
     """With the motion of its parent a branch has the parent's bits; with another epoch it has the same events."""
     dense = FLUID | {"placement": FLUID["placement"] | {"packing_fraction": 0.45}, "contact": []}
-    first = ran(tmp_path, dense, ["run.end_time=1.3", "integrator.step=0.7"], "first")
+    first = ran(tmp_path, dense, ["run.end_time=1.4", "integrator.step=0.7"], "first")
     whole = thermo(ran(tmp_path, dense, ["run.end_time=2.5", "integrator.step=0.7"], "whole"))
     for name, settings in (("same", []), ("other", ["--set", "integrator.step=0.31"])):
         subprocess.run([CAROM, "branch", str(first), "--quiet", "-o", str(tmp_path / name), "--set", "run.end_time=2.5", *settings], check=True,

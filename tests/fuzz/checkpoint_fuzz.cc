@@ -52,7 +52,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       bytes.resize(std::max(size, kBlock));
       std::fill_n(bytes.begin(), kBlock, std::uint8_t{0});
       const std::size_t rest = bytes.size() - kBlock;
-      std::snprintf(reinterpret_cast<char*>(bytes.data()), kBlock, "carom checkpoint 7\nbytes %zu\ncrc32 %08x\n", rest,
+      std::snprintf(reinterpret_cast<char*>(bytes.data()), kBlock, "carom checkpoint 8\nbytes %zu\ncrc32 %08x\n", rest,
                     libdeflate_crc32(0, bytes.data() + kBlock, rest));
     }
     file.set(bytes);

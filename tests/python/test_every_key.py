@@ -106,6 +106,8 @@ DECKS = [
                  "transport_interval": 0.1, "transport_longest": 1.0, "pressure_tensor_interval": 0.1, "sample_start": 0.1,
                  "checkpoint_wall": "00:10:00", "units": {"length": "nm", "time": "ps"}, "events": True},
          system=FLAT | {"boundary": ["periodic", "periodic"]}, integrator={"type": "free-flight", "step": 0.01}),
+    deck(system=FLAT | {"boundary": ["periodic", "periodic"], "shear": {"rate": 0.1}, "tilt": 1.5},
+         integrator={"type": "free-flight", "step": 0.01}),
 ]
 
 
@@ -121,6 +123,8 @@ def by_calls(deck):
         sim.add_particles(species=table.pop("name"), **table)
         if heat.get("temperature"):
             sim.thermalize(**heat)
+    if "shear" in system:
+        sim.shear_rate, sim.tilt = system["shear"]["rate"], system["tilt"]
     if "placement" in deck:
         if deck["integrator"]["type"] == "verlet":
             sim.integrator(**deck["integrator"])  # its particles have no cores

@@ -11,7 +11,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 TUTORIALS = sorted((ROOT / "inputs" / "tutorials").glob("[0-9]*.md")) + sorted((ROOT / "inputs" / "tutorials" / "python").glob("[0-9]*.md"))
 GUIDE = sorted((ROOT / "inputs" / "guide").glob("*.md"))
 PAGES = TUTORIALS + GUIDE + [ROOT / "tools" / "site" / "gallery.md"]
-SLOW = ["tutorials/1-equation-of-state", "tutorials/2-thesis-figures", "tutorials/9-wells-and-cavities"]
+SLOW = ["tutorials/1-equation-of-state", "tutorials/2-thesis-figures", "tutorials/9-wells-and-cavities", "tutorials/10-sheared-fluid"]
 
 
 def run_page(page):

@@ -90,7 +90,8 @@ struct NearTask {
   float scale[3];       ///< length of 1/1024 of a cell, by axis
   float limit_squared;  ///< of the distance
   float cells_squared;  ///< of the distance of cells
-  /// Distances are the least ones under strains from mean − half to mean + half (flow_frame.h); both are 0 without flow.
+  /// Distances are the least ones under strains from mean − half to mean + half (flow_frame.h); both are 0 without
+  /// flow.
   float mean_strain, half_strain;
 };
 

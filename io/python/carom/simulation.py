@@ -405,9 +405,9 @@ class Simulation:
     @property
     def means(self):
         """Means over time with their standard errors, up to now: ["pressure"]["mean"], ["standard_error"], ["independent_samples"]; also
-        of temperature, potential, collision_rate, mean_free_time and mean_free_path, and in a sheared box of shear_stress. Each step, or epoch of free flight, is a sample. A
-        standard error is NaN if there are fewer than eight independent blocks of samples; ["needed_time"] is then the time to which the
-        run must go at least, at the correlations seen so far."""
+        of temperature, potential, collision_rate, mean_free_time and mean_free_path, and in a sheared box of shear_stress. Each step, or
+        epoch of free flight, is a sample. A standard error is NaN if there are fewer than eight independent blocks of samples;
+        ["needed_time"] is then the time to which the run must go at least, at the correlations seen so far."""
         return self._session.means()
 
     def integrator(self, type, **parameters):
@@ -505,10 +505,10 @@ class Simulation:
     species_names = property(lambda self: self._session.species, doc="The names of the species.")
     box = property(lambda self: self._table("system").get("box", [1.0] * self._table("system")["dimension"]), doc="Edges of the box [length].")
     shear_rate = property(lambda self: self._table("system").get("shear", {"rate": 0.0})["rate"],
-                          lambda self, rate: self._session.set("shear", {"rate": float(rate)}),
+                          lambda self, rate: self._session.set_shear(float(rate), None),
                           doc="The rate of Lees-Edwards boundaries: the velocity of the flow along x, divided by y [1/time]. Set it between two "
                               "runs; 0 ends the flow.")
-    tilt = property(lambda self: self._session.tilt, lambda self, tilt: self._session.set("shear", {"rate": self.shear_rate, "tilt": float(tilt)}),
+    tilt = property(lambda self: self._session.tilt, lambda self, tilt: self._session.set_shear(self.shear_rate, float(tilt)),
                     doc="Where the image of the box above is along x, between 0 and the edge [length]. A flow changes it.")
     steps = property(lambda self: self._session.tables("step"), doc="The steps of pairs, as dictionaries of their options.")
     contacts = property(lambda self: self._session.tables("contact"), doc="The laws of contacts, as dictionaries of their options.")

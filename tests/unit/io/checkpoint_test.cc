@@ -105,7 +105,7 @@ TEST(Checkpoint, TheOneBeforeIsTakenWhereTheLastIsDamaged) {
   write(last, good.substr(0, good.size() / 2));
   EXPECT_EQ(last_checkpoint(directory, warning).file(), before);
   EXPECT_NE(warning.find("checkpoint.h5: the checkpoint is damaged or cut off"), std::string::npos) << warning;
-  for (const auto& [format, age] : {std::pair{"1", "an older"}, {"8", "a newer"}}) {
+  for (const auto& [format, age] : {std::pair{"1", "an older"}, {"9", "a newer"}}) {
     write(before, std::string("carom checkpoint ") + format + "\n");
     try {
       last_checkpoint(directory, warning);
@@ -113,7 +113,7 @@ TEST(Checkpoint, TheOneBeforeIsTakenWhereTheLastIsDamaged) {
     } catch (const Error& e) {
       const std::string text = e.what();
       EXPECT_NE(text.find("damaged or cut off"), std::string::npos) << text;
-      EXPECT_NE(text.find(std::string(age) + " carom; this one reads format 7"), std::string::npos) << text;
+      EXPECT_NE(text.find(std::string(age) + " carom; this one reads format 8"), std::string::npos) << text;
     }
   }
 }

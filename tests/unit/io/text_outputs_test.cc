@@ -49,11 +49,11 @@ TEST(Thermo, RowsHoldExactDoublesAtOnce) {
   EXPECT_EQ(header,
             "time,step,collisions,kinetic,potential,total,shadow,max_energy_error,momentum_x,momentum_y,momentum_z,"
             "temperature,pressure,conserved,dissipated,work,heat,rotational,rotational_temperature,step_length,bonds,"
-            "pressure_y-,pressure_y+,pressure_z-,pressure_z+");
+            "shear_stress,pressure_y-,pressure_y+,pressure_z-,pressure_z+");
   std::vector<double> values;
   for (std::istringstream cells(row); std::getline(cells, cell, ',');)
     values.push_back(std::strtod(cell.c_str(), nullptr));
-  ASSERT_EQ(values.size(), 25U);
+  ASSERT_EQ(values.size(), 26U);
   EXPECT_EQ(values[0], 0.1);
   EXPECT_EQ(values[2], 21);
   EXPECT_EQ(values[5], 1.25);

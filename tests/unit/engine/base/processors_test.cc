@@ -100,7 +100,7 @@ void expect(const std::string& name, const Hash& hash) {
       {"edda, bonds, 3-D", 0x80b5c6ecd8f6cb6f},
       {"edda, gravity, 3-D", 0x6d1ca19c04d1c25d},
       {"free-flight, laws, ledger", 0x76200ac856674593},
-      {"free-flight, laws, 2-D", 0xf5ec03a1817f6c7b},
+      {"free-flight, laws, 2-D", 0x7a14df554b5bb08f},
       {"psa, laws, ledger", 0xf78ef86aac679420},
       {"psa, laws, 2-D", 0x60e71070a494a4b0},
       {"cva, laws, ledger", 0xf7480ab520ae9260},

@@ -51,8 +51,8 @@ std::vector<Hit> obvious_run(const Box<D>& box, Particles<D> p, const Vec<D>& g,
           }
           if (!allowed) continue;
           if (box.sheared())  // where the images of a row are
-            image[0] -= static_cast<int>(std::nearbyint(
-                (p.x[i][0] - p.x[j][0] + image[1] * (box.tilt + now * box.slide())) / box.edges[0]));
+            image[0] -= static_cast<int>(
+                std::nearbyint((p.x[i][0] - p.x[j][0] + image[1] * (box.tilt + now * box.slide())) / box.edges[0]));
           const Offset<D> offset = box.offset(image);
           Vec<D> d = p.x[i] - p.x[j] + offset.start, v = p.v[i] - p.v[j];
           d[0] += now * offset.slide;
