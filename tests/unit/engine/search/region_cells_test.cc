@@ -7,6 +7,7 @@
 
 #include <random>
 #include <set>
+#include <tuple>
 
 namespace carom::region_cells_test {
 namespace {
