@@ -99,7 +99,6 @@ ScanSetting Flights<D>::setting() const {
                       .field_bits = packing_.field_bits,
                       .plain = radius_.empty() && !field_ && growth_ == 0 && !sheared_,
                       .sheared = radius_.empty() && !field_ && growth_ == 0 && sheared_,
-                      .slides = sheared_,
                       .tilt = sheared_ ? box_.tilt : 0,
                       .slide = sheared_ ? box_.slide() : 0,
                       .surfaces = surfaces_.empty() ? nullptr : surfaces_.data(),

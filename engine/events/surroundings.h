@@ -14,20 +14,6 @@
 
 namespace carom {
 
-/// predict_leaving() for a sphere without a field, at e from the centre of its region at the time of its record, with
-/// the velocity v relative to it.
-template <int D>
-void predict_leaving(NextEvent<D>& a, const Vec<D>& e, const Vec<D>& v, double t, double skin, double now) {
-  if (a.contact < kNever && (e + (a.contact - t) * v).squaredNorm() < skin * skin) {
-    a.update = kNever;  // not before its contact: a segment between two points of a ball stays in it
-    return;
-  }
-  // |e + v s| = skin; the form with cancellation is accurate enough for a bound
-  const double b = e.dot(v), v_squared = v.squaredNorm(), room = skin * skin - e.squaredNorm();
-  const double s = (std::sqrt(std::max(b * b + v_squared * room, 0.0)) - b) / v_squared;
-  a.update = v_squared > 0 ? std::max(t + s, now) : kNever;
-}
-
 /// Sets a.update to a time before which a sphere with this record stays in the region of its list, a ball of radius
 /// `skin` that moves with the flow. Its contact must have been planned.
 template <int D>
@@ -42,7 +28,17 @@ void predict_leaving(NextEvent<D>& a, const Record<D>& r, const Flights<D>& flig
     e[0] -= speed * (r.t - flow.time);
     v[0] -= speed;
   }
-  if (!flights.field()) return predict_leaving(a, e, v, r.t, skin, now);
+  if (!flights.field()) {
+    if (a.contact < kNever && (e + (a.contact - r.t) * v).squaredNorm() < skin * skin) {
+      a.update = kNever;  // not before its contact: a segment between two points of a ball stays in it
+      return;
+    }
+    // |e + v s| = skin; the form with cancellation is accurate enough for a bound
+    const double b = e.dot(v), v_squared = v.squaredNorm(), room = skin * skin - e.squaredNorm();
+    const double s = (std::sqrt(std::max(b * b + v_squared * room, 0.0)) - b) / v_squared;
+    a.update = v_squared > 0 ? std::max(r.t + s, now) : kNever;
+    return;
+  }
   // A sphere moves at most |v| s + |g| s²/2 from where it is at `now`.
   const double s0 = now - r.t;
   e += s0 * v + (0.5 * s0 * s0) * flights.g();

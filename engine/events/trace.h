@@ -61,8 +61,8 @@ class Trace {
   };
   // Sphere k of an event, k = 0 or 1, has the entry number 2·event + k.
 
-  /// Removes all events and makes room for this many slots. Speeds are relative to a flow along the first axis, whose
-  /// velocity is shear_rate·y.
+  /// Removes all events and makes room for this many slots. Speeds are relative to a flow with the velocity
+  /// shear_rate·y along the first axis.
   void clear(std::size_t slots, double shear_rate) {
     shear_rate_ = shear_rate;
     base_ += 2 * static_cast<std::uint32_t>(size_);

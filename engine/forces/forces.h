@@ -96,7 +96,8 @@ class MeanForces {
   /// for `changed` particles.
   std::uint64_t update(const System<D>& system, Positions<D> x, Positions<D> x_before, Positions<D> x_new,
                        const char* changed) {
-    if (!room_) evaluate(system, x, x_before);      // after hundreds of changes, how many depends on the lists
+    // The sums have room for hundreds of changes. How many, depends on the lists, so their renewal does not count.
+    if (!room_) evaluate(system, x, x_before);
     if (!room_) return evaluate(system, x, x_new);  // invalid sums
     std::uint64_t pairs = 0;
     for (const auto& term : system.interactions) {

@@ -2,7 +2,6 @@
 #include "engine/integrators/registry.h"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 
 namespace carom {
@@ -38,7 +37,6 @@ std::string IntegratorInfo::refusal_of_steps() const {
 template <int D>
 std::string IntegratorInfo::refusal_of_shear(const System<D>& system, bool fixed) const {
   const Box<D>& box = system.box;
-  if (!std::isfinite(box.shear_rate)) return "the rate of 'shear' is not finite; give a number";
   if (!box.sheared()) return "";
   if (!shear)
     return std::string("'").append(name).append("' knows no shear yet; take free-flight, or leave 'shear' out");

@@ -17,11 +17,19 @@ constexpr double kCollisionsPerWindow = 0.15;
 constexpr double kMaxDisplacement = 1.0, kMinDisplacement = 0.02;  // [largest diameter]
 constexpr double kSpeedAllowance = 1.15;                           // speed allowed for, relative to the largest speed
 
+/// The velocity of a sphere relative to the flow.
+template <int D>
+Vec<D> relative_velocity(const Box<D>& box, const Particles<D>& block, Id i) {
+  Vec<D> v = block.v[i];
+  v[0] -= box.flow(block.x[i]);
+  return v;
+}
+
 /// The time in which a sphere has kCollisionsPerWindow collisions, by Enskog's theory, if the spheres fill the box.
 template <int D>
-double first_pace(const Box<D>& box, const Sizes& sizes, Communicator& ranks, const std::vector<Vec<D>>& velocities) {
+double first_pace(const Box<D>& box, const Sizes& sizes, Communicator& ranks, const Particles<D>& block) {
   ExactSum squares;  // exact, so that it does not depend on the number of ranks
-  for (const Vec<D>& v : velocities) squares.add(v.squaredNorm());
+  for (Id i = 0; i < block.v.size(); ++i) squares.add(relative_velocity(box, block, i).squaredNorm());
   const double thermal = std::sqrt(sum_of_all(ranks, squares).value() / static_cast<double>(D * sizes.spheres));
   const Extent<D> all(sizes.spheres, Vec<D>::Zero(), box.edges);
   return kCollisionsPerWindow / (contacts_a_length(situation_of<D>(box, sizes.radius, all, sizes.number)) * thermal);
@@ -35,19 +43,15 @@ void WindowLength<D>::start(const Box<D>& box, const Sizes& sizes, Communicator&
   each_ = 0.5 * kCollisionsPerWindow * static_cast<double>(sizes.spheres);
   field_ = g.norm() * horizon;
   fastest_ = 0;
-  std::vector<Vec<D>> relative;  // to the flow
   if (box.sheared()) {
-    relative = block.v;
-    for (Id i = 0; i < relative.size(); ++i) relative[i][0] -= box.flow(block.x[i]);
     longest_ = kStrainOfWindow / std::abs(box.shear_rate);
     // Free flight at a strain e after an event, by the largest singular value of the shear; and the window itself.
     const double e = 0.5 * std::abs(box.shear_rate) * horizon;
     stretch_ = (1 + kStrainOfWindow) * (e + std::sqrt(1 + e * e));
   }
-  const std::vector<Vec<D>>& velocities = box.sheared() ? relative : block.v;
-  for (const Vec<D>& v : velocities) fastest_ = std::max(fastest_, v.norm());
+  for (Id i = 0; i < block.v.size(); ++i) fastest_ = std::max(fastest_, relative_velocity(box, block, i).norm());
   ranks.largest({&fastest_, 1});
-  if (pace_ == 0 && fastest_ > 0) pace_ = first_pace(box, sizes, ranks, velocities);
+  if (pace_ == 0 && fastest_ > 0) pace_ = first_pace(box, sizes, ranks, block);
   fastest_ = kSpeedAllowance * stretch_ * fastest_ + field_;
   max_displacement_ = std::clamp(fastest_ > 0 ? 1.05 * pace_ * fastest_ : 0, kMinDisplacement * diameter_,
                                  kMaxDisplacement * diameter_);
@@ -57,7 +61,7 @@ template <int D>
 double WindowLength<D>::window_end(double now, double end, double collisions) const {
   double length = fastest_ > 0 ? max_displacement_ / fastest_ : end - now;
   if (pace_ > 0) length = std::min({length, pace_, (0.1 + std::max(collisions, 0.0) / each_) * pace_});
-  if (longest_ > 0) length = std::min(length, longest_);
+  length = std::min(length, longest_);
   if (forced_) length = std::min(length, forced_());
   const double windows = std::ceil((end - now) / length * (1 - 1e-9));
   return windows <= 1 ? end : now + (end - now) / windows;

@@ -43,8 +43,8 @@ class WindowLength {
   double diameter_;
   std::function<double()> forced_;
   double max_displacement_ = 0;
-  double field_ = 0;    // speed that the field may add in the epoch
-  double longest_ = 0;  // window in a sheared box; 0: it has no limit
+  double field_ = 0;                                          // speed that the field may add in the epoch
+  double longest_ = std::numeric_limits<double>::infinity();  // window in a sheared box
   double stretch_ = 1;  // by which the flow may lengthen a displacement relative to it in a window
   double fastest_ = 0;  // largest speed expected
   double pace_ = 0;     // estimated time in which a sphere has kCollisionsPerWindow collisions

@@ -93,8 +93,8 @@ class FluxIntegral {
     for (const Contact<D>& each : contacts) {
       const bool pair = each.key.kind == EventKind::pair;
       Fluxes<D> jump;
-      const auto bounced = [&](Id i, const Vec<D>& v,
-                               const Vec<D>& impulse) {  // returns the kinetic energy that i gets
+      // Returns the kinetic energy that i gets.
+      const auto bounced = [&](Id i, const Vec<D>& v, const Vec<D>& impulse) {
         if (!(mass_[i] > 0)) return 0.0;
         const Vec<D> after = v - drift_, before = after - impulse / mass_[i];
         jump.add_kinetic(mass_[i], after);

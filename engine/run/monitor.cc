@@ -292,7 +292,8 @@ void Monitor<D>::add_to_series(const Waiting& slab, double path) {
   for (std::size_t wall = 0; wall < std::min(column_of_wall_.size(), tally.walls.size()); ++wall)
     values_[Statistics::mean_names.size() + column_of_wall_[wall]] +=
         since(tally.walls[wall].impulse, sampled_walls_[wall]);
-  if (system_.box.sheared()) values_.back() = stress_of(since(tally.shear, account_.sampled_shear), system_.box);
+  if (const double work = system_.box.sheared() ? since(tally.shear, account_.sampled_shear) : 0; system_.box.sheared())
+    values_.back() = system_.box.plain() ? stress_of(work, system_.box) : none;
   statistics_.series.add(values_, weights_);
 }
 

@@ -71,7 +71,7 @@ void RegionCells<D>::clear() {
     }
   }
   // A row of boxes is displaced along the first axis.
-  const double rows = grid_.count(1) > 0 ? (margin_ + grid_.count(1) - 1) / grid_.count(1) : 0;
+  const std::int32_t rows = (margin_ + grid_.count(1) - 1) / grid_.count(1);
   widest_ += static_cast<std::int32_t>(std::ceil(rows * std::abs(grid_.box().tilt) / grid_.box().edges[0]));
 }
 

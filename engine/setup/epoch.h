@@ -11,8 +11,8 @@
 namespace carom {
 
 /// The strain of a sheared box in a slab of free flight. Lists of neighbours hold for a slab: with a longer one they
-/// are longer, with a shorter one they are made more often (engine/search/flow_frame.h). With 10,976 spheres at a
-/// packing fraction of 0.26, restitution 0.9 and rate 1, strains of 0.25, 0.5 and 1 gave 170, 191 and 179 thousand
+/// are longer, with a shorter one they are made more often (engine/search/flow_frame.h). With 10,976 spheres in
+/// inputs/sheared-fluid.toml, restitution 0.9 and rate 1, strains of 0.25, 0.5 and 1 gave 170, 191 and 179 thousand
 /// collisions a second, and elastic spheres at rate 0.1 251, 240 and 246 thousand.
 inline constexpr double kStrainOfSlab = 0.5;
 /// The longest slab of a sheared box, shorter for a box that is so high that its images slide far; infinite if the

@@ -117,17 +117,16 @@ std::vector<TableSchema> make_schema() {
          Parameter::Type::table,
          "none",
          "-",
-         "a flow along x whose velocity increases with y, by Lees–Edwards boundaries: the images of the box above and "
-         "below slide along x. All velocities, given and written, are relative to this flow",
+         "a flow along x with a velocity that increases with y, by Lees–Edwards boundaries: images of the box above "
+         "and below slide along x. All velocities, given and written, are relative to this flow",
          Range::any,
          {},
          {},
          std::numeric_limits<double>::infinity(),
          {{"rate", real, "", "1/time", "the velocity of the flow at y is rate·y"}}},
         {"tilt", real, "none", "length",
-         "where the image of the box above is along x at the start, between 0 and the edge along x, as a flow before "
-         "this "
-         "run has left it"}}},
+         "where the image of the box above is along x at the start, between 0 and the edge along x: a flow before this "
+         "run has moved it there"}}},
       {"contact", true, false, "the law of all contacts between two partners; contacts without one are elastic",
        contact_parameters()},
       {"step", true, false,

@@ -85,6 +85,7 @@ Session<D>::Session(Deck& deck, const std::optional<GivenState>& given, const Pa
   for (const char* const table : {"particles", "placement", "run", "output"}) values_.list(table).clear();
   for (std::size_t n = 0; n < system_->interactions.size(); ++n)
     set_bonds(values_.list("interaction")[n].values, *system_->interactions[n]);
+  note_tilt();
   species_ = system_->species;
   size_ = system_->size();
   text_ = deck.toml_text;

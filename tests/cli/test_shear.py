@@ -99,8 +99,8 @@ def test_a_rate_of_zero_is_no_shear(tmp_path):
 
 
 def test_two_spheres_meet_through_an_image_that_slides(tmp_path):
-    """At rest relative to the flow at y = 0.5 and y = 3.5 in a box of 4: the image of the first above the second comes from x = 1 with the
-    velocity of the flow at y = 4.5, the second has that at 3.5. They touch when they are nearly above each other."""
+    """Both are at rest relative to the flow, at y = 0.5 and y = 3.7 in a box of 4. The image of the first disc above the second one starts at
+    x = 1 with the velocity of the flow at y = 4.5, and the second disc has the velocity of the flow at 3.7."""
     rate, x, y = 0.5, 2.2, 3.7
     pair = FLUID | {"system": {"dimension": 2, "box": [6.0, 4.0], "boundary": ["periodic", "periodic"], "shear": {"rate": rate}},
                     "particles": [{"name": "disc", "radius": 0.5, "position": [[1.0, 0.5], [x, y]], "velocity": [[0.0, 0.0], [0.0, 0.0]]}],
@@ -179,7 +179,7 @@ def test_a_killed_run_goes_on(killer, tmp_path):
 
 
 def test_a_branch_starts_with_the_tilt(tmp_path):
-    """With the motion of its parent a branch has the parent's bits; with another epoch it has the same events."""
+    """A branch goes on as its parent, with the parent's bits, or with another epoch, which changes the rounding."""
     dense = FLUID | {"placement": FLUID["placement"] | {"packing_fraction": 0.45}, "contact": []}
     first = ran(tmp_path, dense, ["run.end_time=1.4", "integrator.step=0.7"], "first")
     whole = thermo(ran(tmp_path, dense, ["run.end_time=2.5", "integrator.step=0.7"], "whole"))

@@ -16,7 +16,7 @@ namespace carom {
 /// The core of a pair or one of its steps (../../laws/steps.h).
 struct ScanSurface {
   double distance, squared;
-  double margin;  ///< a pair whose squared distance is nearer to `squared` than this may be on either side
+  double margin;  ///< a pair may be on either side if its squared distance differs from `squared` by less than this
 };
 
 /// The constants of all scans of one core. Each record has 8 doubles (record.h).
@@ -31,7 +31,6 @@ struct ScanSetting {
   int slot_bits = 0, field_bits = 0;
   bool plain = true;                      ///< one diameter, no acceleration, no growth, no shear
   bool sheared = false;                   ///< otherwise plain, but the box is sheared
-  bool slides = false;                    ///< the box is sheared
   double tilt = 0, slide = 0;             ///< of the image above, at time 0, along the first axis (Offset)
   const ScanSurface* surfaces = nullptr;  ///< for scan_steps: the core and the steps, from the inside out
   unsigned surface_count = 0;

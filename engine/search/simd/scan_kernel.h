@@ -122,7 +122,7 @@ inline __attribute__((always_inline)) Double<W> contact_times(const ScanSetting&
         boxes[k] = __builtin_convertvector(image, V);
         shift[k] = boxes[k] * s.edges[k];
       }
-      const bool slides = pairs == Pairs::sheared || (pairs == Pairs::general && s.slides);
+      const bool slides = pairs == Pairs::sheared || (pairs == Pairs::general && (s.tilt != 0 || s.slide != 0));
       if (slides) shift[0] += boxes[1] * s.tilt;
       for (int k = 0; k < D; ++k) d[k] -= shift[k];
       if (slides) {

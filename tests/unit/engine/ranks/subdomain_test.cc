@@ -160,6 +160,24 @@ TEST(Ownership, SpheresThatFallChangeTheirOwners) {
   EXPECT_NE(d.parts[0]->ownership.own(), first);
 }
 
+/// A sphere that has moved with the flow since an old record may meet one that has come from far.
+TEST(Ownership, UnderShearAGhostMeetsWhatIsNearAtTheEnd) {
+  auto sheared = fluid();
+  sheared->box.shear_rate = 0.2;
+  const Divided d(std::move(sheared));
+  const Ownership<3>& here = d.parts[0]->ownership;
+  const double reach = d.bisection.reach(), end = 3;
+  for (const Slot j : here.own()) {
+    const Record<3> there = d.parts[0]->core.flights().at(j, end);
+    for (const double part : {1 - 1e-9, 1.2}) {
+      Record<3> ghost{there.x + part * reach * Vec<3>(0.6, 0, 0.8), Vec<3>::Zero(), 0.0, 0, 0, 0};
+      ghost.v[0] = d.system->box.flow(ghost.x);
+      ghost.x -= end * ghost.v;
+      EXPECT_EQ(here.may_meet(ghost, j, {}, end), part < 1) << j;
+    }
+  }
+}
+
 /// A ghost that has just been admitted may collide as often in its first window as the log allows.
 TEST(Ownership, AFreshGhostMayCollideManyTimes) {
   const Divided d;

@@ -115,6 +115,15 @@ TEST(RegionCells, FindSpheresInATiltedLattice) {
   }
 }
 
+TEST(RegionCells, SeeAsFarAfterTheyHaveBeenEmptied) {
+  Centres<2> c({.edges = {5, 9}, .boundary = {P, P}, .tilt = 12}, 50, 1);
+  c.cells.clear();
+  const auto widest = c.cells.widest();
+  EXPECT_EQ(widest, 1 + 3);  // the next box along y, and its displacement
+  c.cells.clear();
+  EXPECT_EQ(c.cells.widest(), widest);
+}
+
 TEST(RegionCells, AreStoredAroundGivenPlacesOnly) {
   Centres<3> c({{30, 30, 4}, {P, W, P}}, 300, 5);
   c.cells.confine(std::vector<Vec<3>>{{1, 1, 1}, {2, 2, 3}});
