@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/base/exact_sum.h"
 #include "engine/base/force_words.h"
 #include "engine/base/vec.h"
 
@@ -34,6 +35,7 @@ class ForceSums {
     high_.clear();
     quantum_ = quantum;
     used_low_ = used_high_ = 0;
+    by_tilt_ = 0;
     invalid_ = false;
   }
   std::size_t size() const { return low_.size(); }
@@ -99,6 +101,14 @@ class ForceSums {
     for (std::size_t n = 0; n < taken.size(); ++n)
       for (int k = 0; k < D; ++k) sums[particles[n]].of[k] += taken[n][k];
   }
+  /// Adds quanta of ∂V/∂tilt, and the sum so far of this rank's pairs; 0 in boxes that are not sheared. Of mean forces
+  /// it is the discrete derivative.
+  void add_by_tilt(Whole quanta) { by_tilt_ += quanta; }
+  ExactSum by_tilt() const {
+    ExactSum sum;
+    sum.add(by_tilt_, quantum_);
+    return sum;
+  }
   /// Marks that some force could not be added: all values are NaN until reset().
   void invalidate() { invalid_ = true; }
 
@@ -136,6 +146,7 @@ class ForceSums {
 
   std::vector<ForceWords> low_, high_;  // high_ is empty until a force needs it
   double quantum_ = 1;
+  Whole by_tilt_ = 0;
   bool invalid_ = false;
   double used_low_ = 0, used_high_ = 0;  // bounds of the sums [quanta]
 };

@@ -70,6 +70,7 @@ void evaluate_forces(const System<D>& system, Positions<D> x, Vectors<D> out, Co
   };
   const auto add = [&](const auto& term) { term.add_forces_early(x, forces, sums, once); };
   force_pass<D>(system, out, forces, counters, add, arrive ? once : Arrival());
+  if (sums && system.box.sheared()) sums->by_tilt = forces.by_tilt();
 }
 
 /// out[i] = −∇̄_i V(x, x_new), the mean force of a discrete-gradient step. One force pass.
@@ -109,6 +110,8 @@ class MeanForces {
   }
   /// The force on an own particle.
   Vec<D> operator[](Id i) const { return forces_.value(i); }
+  /// ForceSums::by_tilt().
+  ExactSum by_tilt() const { return forces_.by_tilt(); }
 
  private:
   ForceSums<D> forces_;

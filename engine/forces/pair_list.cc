@@ -57,7 +57,11 @@ PairRecords<D>& CutoffList<D>::cover(const PairStep<D>& step, const Particles<D>
   if (!known && !still)
     for (std::size_t i = 0; i < step.x.size(); ++i) squared_step = farther<D>(squared_step, step.x_new[i] - step.x[i]);
   if (!made_) skin_.begin(2 * *shared_width_);
-  const double length = std::sqrt(squared_step), from_build = std::sqrt(squared_from_build);
+  double length = std::sqrt(squared_step), from_build = std::sqrt(squared_from_build);
+  if (box_.sheared()) {
+    length += 0.5 * std::abs(strain_of(step)) * cutoff_;
+    if (known) from_build += lost_to(std::max(std::abs(strain()), std::abs(strain() + strain_of(step))));
+  }
   grown_ = from_build - std::exchange(farthest_, from_build);
   const bool renew = std::exchange(renew_, false);
   if (!skin_.lasts(known, from_build, length) || renew) {
@@ -81,25 +85,42 @@ PairRecords<D>* CutoffList<D>::cover_own(const PairStep<D>& step, const Particle
   own_squared_ = 0;
   if (particles.ghost.empty() || !is_for(step, particles) || !follow(step, 0, records_.own, own_squared_, none))
     return nullptr;
-  if (own_squared_ > 0.25 * skin_.width() * skin_.width()) return nullptr;
+  const double lost = box_.sheared() ? lost_to(std::abs(strain())) : 0;
+  if (std::sqrt(own_squared_) + lost > 0.5 * skin_.width()) return nullptr;
   records_.load(step, 0, records_.own);
   return &records_;
 }
 
-/// The largest displacements since the last build, of the particles in these places. Updates the boxes of particles
-/// that were wrapped; returns false if one was wrapped that is not marked as moving, or if a position is not finite.
+/// What a strain since the build takes from each of the two displacements that the skin allows, for a pair within the
+/// cutoff: relative to the flow, its distance at the build was at most (|e|/2 + √(1 + e²/4)) times that of now.
+template <int D>
+double CutoffList<D>::lost_to(double strain) const {
+  const double half = 0.5 * strain;
+  return 0.5 * (cutoff_ + skin_.width()) * (1 - 1 / (half + std::sqrt(1 + half * half)));
+}
+
+/// The largest displacements since the last build, relative to the flow of a sheared box, of the particles in these
+/// places. Updates the boxes of particles that were wrapped; returns false if one was wrapped that is not marked as
+/// moving, or if a position is not finite.
 template <int D>
 bool CutoffList<D>::follow(const PairStep<D>& step, std::size_t first, std::size_t end, double& squared_from_build,
                            double& squared_step) {
   const double allowed = 0.25 * skin_.width() * skin_.width();
+  const bool sheared = box_.sheared();
+  const double strain = sheared ? this->strain() : 0, strain_in_step = sheared ? strain_of(step) : 0;
+  const double tilt = sheared ? tilt_since_build() : 0, tilt_in_step = strain_in_step * box_.edges[1];
   for (std::size_t r = first; r < end; ++r) {
     const Id i = records_.order[r];
     Vec<D> home;
     for (int k = 0; k < D; ++k) home[k] = built_at_[k][r];
-    const auto in_box = [&](const Vec<D>& x) {
+    const auto in_box = [&](const Vec<D>& x, bool later = false) {
       Vec<D> y = x - home;
       if (!records_.box.empty())
         for (int k = 0; k < D; ++k) y[k] -= (&records_.box[r].x)[k] * box_.edges[k];
+      if (sheared) [[unlikely]] {
+        y[0] -= records_.box[r].y * (tilt + (later ? tilt_in_step : 0));
+        y[0] -= (strain + (later ? strain_in_step : 0)) * home[1];
+      }
       return y;
     };
     Vec<D> way = in_box(step.x[i]);
@@ -109,13 +130,14 @@ bool CutoffList<D>::follow(const PairStep<D>& step, std::size_t first, std::size
       if (jump != Image<D>{}) {
         if ((code_[r] & PartnerSearch::kMoving) == 0) return false;
         for (int k = 0; k < D; ++k) (&records_.box[r].x)[k] -= jump[k];
+        if (sheared) records_.box[r].x += jump[1] * (box_.turns - records_.turns);
         way = in_box(step.x[i]);
       }
     }
     squared_from_build = std::max(squared_from_build, way.squaredNorm());
     if (step.x_new.empty()) continue;
-    squared_from_build = farther<D>(squared_from_build, in_box(step.x_new[i]));
-    squared_step = farther<D>(squared_step, step.x_new[i] - step.x[i]);
+    squared_from_build = farther<D>(squared_from_build, in_box(step.x_new[i], true));
+    squared_step = farther<D>(squared_step, sheared ? in_box(step.x_new[i], true) - way : step.x_new[i] - step.x[i]);
   }
   return true;
 }
@@ -123,6 +145,8 @@ bool CutoffList<D>::follow(const PairStep<D>& step, std::size_t first, std::size
 template <int D>
 void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles) {
   made_ = true;
+  built_with_tilt_ = box_.tilt;
+  records_.turns = box_.turns;
   particles_ = step.x.size();
   records_.clear();
   records_.partners[PairRecords<D>::kMoving].clear();
@@ -167,7 +191,7 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
     boxes[r] = grid.boxes(grid.cell(step.x[i]));
     const Vec<D> home = step.x[i] - box_.shift(boxes[r]);
     std::uint64_t code = filter_.species.code(i);
-    bool moving = boxes[r] != Image<D>{};
+    bool moving = box_.sheared() || boxes[r] != Image<D>{};
     for (int k = 0; k < D; ++k)
       moving = moving || (box_.periodic(k) &&
                           std::min(home[k], box_.edges[k] - home[k]) <= 0.5 * skin_.width() + 1e-9 * box_.edges[k]);
@@ -249,6 +273,7 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
     if (other_.size() < candidates) other_.resize(candidates);
     search.here = ranges[first].here();
     for (int k = 0; k < 3; ++k) search.own[k] = built_at_[k][row] + (k < D ? image[k] * box_.edges[k] : 0.0);
+    if (box_.tilt != 0) search.own[0] += image[1] * box_.tilt;
     PartnersFound found{plain.data() + size, other_.data()};
     for (; first < last; ++first) kernels_->find(search, ranges[first].begin, ranges[first].end, found);
     const auto remove = [&](auto&& condition) {

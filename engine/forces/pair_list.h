@@ -51,6 +51,14 @@ class CutoffList {
   bool is_for(const PairStep<D>& step, const Particles<D>& particles) const {
     return made_ && particles_ == step.x.size() && ghost_ == particles.ghost;
   }
+  /// The tilt in the lattice of the last build, where it was in the box.
+  double tilt_since_build() const { return box_.tilt + (box_.turns - records_.turns) * box_.edges[0]; }
+  /// The strain since the last build, and in a step over which mean forces are computed.
+  double strain() const { return (tilt_since_build() - built_with_tilt_) / box_.edges[1]; }
+  double strain_of(const PairStep<D>& step) const {
+    return step.x_new.empty() ? 0 : (box_.next_tilt - box_.tilt) / box_.edges[1];
+  }
+  double lost_to(double strain) const;
   bool follow(const PairStep<D>& step, std::size_t first, std::size_t end, double& squared_from_build,
               double& squared_step);
   void build(const PairStep<D>& step, const Particles<D>& particles);
@@ -68,6 +76,7 @@ class CutoffList {
   double farthest_ = 0, grown_ = 0;  // the largest displacement at the last cover(), and how much it had grown
   PairRecords<D> records_;           // own particles before ghosts
   double own_squared_ = 0;           // the largest squared displacement found by cover_own()
+  double built_with_tilt_ = 0;
   std::array<std::vector<double>, 3> built_at_;  // coordinates in the box at the last build
   std::vector<std::uint64_t> code_;
   std::vector<Id> id_;  // by place; empty if there are no ghosts

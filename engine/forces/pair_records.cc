@@ -37,6 +37,12 @@ PairRows PairRecords<D>::rows(Kind kind, const Box<D>& in, const PairStep<D>& st
   if (rows.vectors || !step.x_new.empty()) rows.x_new = x_new_.data();
   if ((kind == kMoving || kind == kSharedMoving) && !box.empty()) rows.box = box.data();
   for (int k = 0; k < D; ++k) rows.edges[k] = in.edges[k];
+  if (in.sheared()) {
+    rows.sheared = true;
+    rows.turns = in.turns - turns;
+    rows.tilt[0] = in.tilt;
+    rows.tilt[1] = in.next_tilt;
+  }
   rows.weighted = step.weight != nullptr;
   rows.partner = partners[kind].data();
   rows.run = runs[kind].data();

@@ -42,6 +42,7 @@ class PairRecords {
   std::vector<PairRun> runs[kKinds];
   std::vector<std::uint32_t> partners[kKinds];  ///< followed by at least eight more, for padding
   std::vector<PairRecord> box;                  ///< numbers of the boxes that the particles are in; empty: all 0
+  std::int32_t turns = 0;                       ///< Box::turns when the images were found
   std::size_t most_partners = 0;                ///< upper bound for any particle
 
   /// Removes all but partners.

@@ -4,16 +4,14 @@
 // The slab is an epoch: at its end all records are moved to one time and wrapped, so that times stay small and keep
 // their last digits. Between events x(t) = x + v s + ½ g s² holds exactly; there is no step and no truncation error.
 //
-// In a sheared box the velocities of particles are relative to the flow γ̇ y along x. During a slab the event core has
-// velocities v in the laboratory and unwrapped positions. The kinetic energy of the motion relative to the flow,
-//   Σ ½ m (v − γ̇ y)² = Σ ½ m v² − γ̇ Σ m (v_x y − ½ γ̇ y²),
-// changes in flight by the last sum, and at contacts as Exchange::shear says. Counters::shear adds both.
+// In a sheared box the event core has velocities in the laboratory during a slab (flow.h).
 
 #include <algorithm>
 #include <optional>
 
 #include "engine/base/error.h"
 #include "engine/events/event_core.h"
+#include "engine/integrators/flow.h"
 #include "engine/integrators/registry.h"
 #include "engine/ranks/windowed_flight.h"
 
@@ -59,24 +57,16 @@ class FreeFlight : public Integrator<D> {
     const double start = system.box.time, tilt = system.box.tilt;
     // Moves the box, and keeps unwrapped positions where the tilt is made shorter.
     const auto move_to = [&](double elapsed, Particles<D>& particles) {
-      const std::int32_t boxes = system.box.pass(start, tilt, elapsed);
-      for (std::size_t i = 0; boxes != 0 && i < particles.image.size(); ++i) {
-        const std::int64_t x = particles.image[i][0] + std::int64_t{boxes} * particles.image[i][1];
-        if (std::abs(x) > std::numeric_limits<std::int32_t>::max())
-          throw Error(Failure::numerical,
-                      "the flow has carried a particle across the periodic box more often than 32 "
-                      "bits can count; end the run earlier, or start a new one from its last state");
-        particles.image[i][0] = static_cast<std::int32_t>(x);
-      }
+      renumber_images(particles, system.box.pass(start, tilt, elapsed));
     };
     {
       const Stopwatch watch(report.counters.seconds.predict);
-      join_flow(system, system.particles, 1, report.counters);
+      join(system, system.particles, 1, report.counters);
       flight.take(system.particles, g_, slab.length);
     }
     const auto end_at = [&](double reached) {
       flight.give_back(reached, system.particles);
-      join_flow(system, system.particles, -1, report.counters);
+      join(system, system.particles, -1, report.counters);
       move_to(reached, system.particles);
     };
     const auto events = [&] { return report.counters.contacts() + report.counters.kicks; };
@@ -97,7 +87,7 @@ class FreeFlight : public Integrator<D> {
       if (copies_.mass.empty()) copies_ = system.particles;
       flight.copy_at(due, copies_);
       copies_.image = system.particles.image;
-      join_flow(system, copies_, -1, report.counters);
+      join(system, copies_, -1, report.counters);
       move_to(due, copies_);
       for (std::size_t i = 0; i < copies_.size(); ++i) system.box.wrap(copies_.x[i], copies_.image[i]);
       report.observer(due, copies_);
@@ -121,24 +111,13 @@ class FreeFlight : public Integrator<D> {
     system.wrap();
   }
 
-  /// Adds the velocity of the flow at unwrapped positions to velocities (sign 1), or takes it off (−1), and books the
-  /// energy that the flow gave in flight: it is the second sum above at the start of the flight less that at its end.
-  void join_flow(const System<D>& system, Particles<D>& particles, double sign, Counters& counters) {
-    const double rate = system.box.shear_rate;
-    if (rate == 0) return;
-    ExactSum booked, undone;
-    for (std::size_t i = 0; i < particles.x.size(); ++i) {
-      const double flow = system.box.flow(particles.x[i]);
-      double& v = particles.v[i][0];
-      if (sign > 0) v += flow;
-      const double moment = rate * system.particles.mass[i] * particles.x[i][1] * (v - 0.5 * flow);
-      booked.add(sign * moment);
-      undone.add(-sign * moment);
-      if (sign < 0) v -= flow;
-    }
-    Communicator& ranks = system.decomposition.ranks();
-    counters.shear.add(sum_of_all(ranks, booked));
-    start_again_ = sum_of_all(ranks, undone);
+  /// join_flow(), which books the energy that the flow gave in flight.
+  void join(const System<D>& system, Particles<D>& particles, double sign, Counters& counters) {
+    if (system.box.shear_rate == 0) return;
+    FlowEnergy<D> energy;
+    energy.join(system, particles.x, particles.v, sign);
+    counters.shear.add(system.decomposition.sum(energy).booked);
+    start_again_ = system.decomposition.sum(energy).undone;
   }
 
   std::uint64_t max_events_;
@@ -149,7 +128,7 @@ class FreeFlight : public Integrator<D> {
   std::int64_t epoch_ = -1;
   std::uint64_t contacts_ = 0;  // of the present epoch in its earlier slabs
   Particles<D> copies_;
-  ExactSum start_again_;  // undoes what the last join_flow() has booked
+  ExactSum start_again_;  // undoes what the last join() has booked
 };
 
 }  // namespace

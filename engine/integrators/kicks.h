@@ -10,10 +10,12 @@ template <int D>
 struct Accelerations {
   std::vector<Vec<D>> a;  ///< [length/time²]
   PotentialSums sums;     ///< at the positions of the last update
+  double by_tilt = 0;     ///< ∂V/∂tilt of all particles there, in a sheared box [force]
 
   /// Call this at the start of a run.
   void start(System<D>& system, Counters& counters) {
     system.fields.add("acceleration", a);
+    if (system.box.sheared()) system.fields.add_value("by tilt", by_tilt);
     update(system, counters);
   }
   /// Evaluates a at the system's positions: one force pass.
@@ -23,6 +25,7 @@ struct Accelerations {
     a.resize(system.particles.size());
     evaluate_forces<D>(system, x, a, counters, &sums, arrive);
     for (std::size_t i = 0; i < a.size(); ++i) a[i] /= system.particles.mass[i];
+    if (system.box.sheared()) by_tilt = system.decomposition.sum(sums).by_tilt.value();
   }
 };
 

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "engine/events/meeting.h"
-#include "engine/integrators/kicks.h"
+#include "engine/integrators/flow.h"
 #include "engine/integrators/registry.h"
 #include "engine/stepping/slab_core.h"
 
@@ -33,12 +33,14 @@ class PrimitiveSplitting : public Integrator<D> {
       const std::vector<Vec<D>> before = p.v;
       try {
         inelastic_slab(system, slab.length, report);
+        system.wrap();
       } catch (const HaloTooSmall&) {  // only the first kick has changed anything
         p.v = before;
         throw;
       }
     } else {
       kicked_ = p.v;
+      FlowOfStep<D> flow(system, kicked_, accelerations_);
       kick(kicked_, accelerations_.a, 0.5 * slab.length);
       core_->begin(kicked_, {}, slab.length);
       core_->fly({});
@@ -47,8 +49,8 @@ class PrimitiveSplitting : public Integrator<D> {
       system.decomposition.update_halo();
       accelerations_.update(system, report.counters);
       kick(p.v, accelerations_.a, 0.5 * slab.length);
+      flow.leave(slab.length, accelerations_, report.counters);
     }
-    system.wrap();
     report.reached = slab.length;
   }
 
@@ -132,6 +134,7 @@ IntegratorInfo psa() {
           .local = true,
           .shadow = true,
           .steps = true,
+          .shear = true,
           .in_2d = make<PrimitiveSplitting, 2>,
           .in_3d = make<PrimitiveSplitting, 3>};
 }

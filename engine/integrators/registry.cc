@@ -39,7 +39,8 @@ std::string IntegratorInfo::refusal_of_shear(const System<D>& system, bool fixed
   const Box<D>& box = system.box;
   if (!box.sheared()) return "";
   if (!shear)
-    return std::string("'").append(name).append("' knows no shear yet; take free-flight, or leave 'shear' out");
+    return std::string("'").append(name).append(
+        "' knows no shear yet; take free-flight, psa, verlet or edda, or leave 'shear' out");
   for (const int k : {0, 1})
     if (!box.periodic(k))
       return "'shear' needs an axis " + std::to_string(k) +
@@ -48,6 +49,13 @@ std::string IntegratorInfo::refusal_of_shear(const System<D>& system, bool fixed
   if (!box.steps.empty()) return "'shear' does not go with [[step]] yet; leave one of them out";
   if (fixed)
     return "fixed particles do not move with the flow of 'shear'; let all particles move, or leave 'shear' out";
+  if (stepping && !box.contacts.elastic())
+    return "'shear' goes with [[contact]] in free-flight only; take this method, or leave one of them out";
+  if (stepping && std::ranges::any_of(box.options, [](const auto& wall) { return wall.temperature > 0; }))
+    return "'shear' goes with thermal walls in free-flight only; take this method, or leave one of them out";
+  if (stepping && std::ranges::any_of(system.interactions, [](const auto& term) { return !term->knows_shear(); }))
+    return "'shear' goes with bonds and with pair forces whose cutoff is shorter than each periodic edge, not with "
+           "fields, Ewald sums or forces without a cutoff; give a cutoff, or leave one of them out";
   return "";
 }
 

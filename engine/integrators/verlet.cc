@@ -2,7 +2,7 @@
 // verlet: kick-drift-kick, K(h/2) D(h) K(h/2), for points without hard cores.
 
 #include "engine/forces/forces.h"
-#include "engine/integrators/kicks.h"
+#include "engine/integrators/flow.h"
 #include "engine/integrators/registry.h"
 
 namespace carom::integrator {
@@ -21,18 +21,20 @@ class Verlet : public Integrator<D> {
   void slab(System<D>& system, const Slab& slab, SlabReport<D>& report) override {
     auto& p = system.particles;
     x_.resize(p.size());
-    v_.resize(p.size());
+    v_ = p.v;
+    FlowOfStep<D> flow(system, v_, accelerations_);
     for (std::size_t i = 0; i < p.size(); ++i) {
-      v_[i] = p.v[i] + (0.5 * slab.length) * accelerations_.a[i];
+      v_[i] += (0.5 * slab.length) * accelerations_.a[i];
       x_[i] = p.x[i] + slab.length * v_[i];
     }
     // Ghosts get positions only. Nothing has changed yet if finish_step() throws.
     system.decomposition.start_step(x_, v_, slab.length);
+    system.box.advance(slab.length);
     accelerations_.update(system, x_, report.counters, [&] { system.decomposition.finish_step(x_); });
     kick(v_, accelerations_.a, 0.5 * slab.length);
     p.x.swap(x_);
     p.v.swap(v_);
-    system.wrap();
+    flow.leave(slab.length, accelerations_, report.counters);
     report.reached = slab.length;
   }
 
@@ -56,6 +58,7 @@ IntegratorInfo verlet() {
           .hard_cores = false,
           .local = true,
           .shadow = true,
+          .shear = true,
           .in_2d = make<Verlet, 2>,
           .in_3d = make<Verlet, 3>};
 }

@@ -81,7 +81,9 @@ struct Box {
   ContactLaws contacts{};
   Steps steps{};
   double shear_rate = 0;  ///< of Lees–Edwards boundaries: dv_x/dy of the flow; the images above slide along x [1/time]
-  double tilt = 0;        ///< where the image above is along x at `time`, in [0, edges[0]) [length]
+  double tilt = 0;        ///< where the image above is along x at `time`; between slabs in [0, edges[0]) [length]
+  double next_tilt = 0;   ///< at the end of the piece over which mean forces are computed [length]
+  std::int32_t turns = 0;  ///< the number of edges that shorten_tilt() has taken off; only its changes have a meaning
 
   /// Whether the lattice of images is not that of the edges alone: it slides, or stays tilted after a flow.
   bool sheared() const { return shear_rate != 0 || tilt != 0; }
@@ -98,6 +100,19 @@ struct Box {
     auto boxes = static_cast<std::int32_t>(std::floor(tilt / edges[0]));
     tilt -= boxes * edges[0];
     if (tilt >= edges[0]) tilt = 0, ++boxes;  // a tiny negative value rounds up
+    return boxes;
+  }
+
+  /// Moves on within a slab of a method with steps; the tilt may become longer than the edge.
+  void advance(double elapsed) {
+    time += elapsed;
+    if (sheared()) tilt += slide() * elapsed;
+  }
+  /// Brings the tilt back between 0 and the edge; returns the number of edges that it has become shorter.
+  std::int32_t shorten_tilt() {
+    if (tilt >= 0 && tilt < edges[0]) return 0;
+    const std::int32_t boxes = pass(time, tilt, 0);
+    turns += boxes;
     return boxes;
   }
 
@@ -225,6 +240,17 @@ struct Box {
     Vec<D> s;
     for (int k = 0; k < D; ++k) s[k] = image[k] == 0 ? 0.0 : image[k] * edges[k];
     if (tilt != 0 && image[1] != 0) s[0] += image[1] * tilt;
+    return s;
+  }
+  /// The displacement of an image at a time after `time`; and at the time of `next_tilt`.
+  Vec<D> shift_after(const Image<D>& image, double elapsed) const {
+    Vec<D> s = shift(image);
+    if (shear_rate != 0 && image[1] != 0) s[0] += image[1] * slide() * elapsed;
+    return s;
+  }
+  Vec<D> next_shift(const Image<D>& image) const {
+    Vec<D> s = shift(image);
+    if (sheared() && image[1] != 0) s[0] = image[0] * edges[0] + image[1] * next_tilt;
     return s;
   }
   /// The displacement and the motion of an image in a slab that starts at `time`.

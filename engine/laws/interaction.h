@@ -45,12 +45,14 @@ struct PotentialSums {
   ExactSum energy{};     ///< V [energy]
   ExactSum magnitude{};  ///< Σ|V| over pairs and particles [energy]
   ExactSum virial{};     ///< Σ d·F over pairs, d = x_i − x_j, F the force on i, without external fields [energy]
+  ExactSum by_tilt{};    ///< ∂V/∂tilt in a sheared box, if forces were evaluated too [force]
   double quantum = 0x1p-46;  ///< the terms of each pair of two particles are rounded to a multiple of it [energy]
 
   void add(const PotentialSums& other) {
     energy.add(other.energy);
     magnitude.add(other.magnitude);
     virial.add(other.virial);
+    by_tilt.add(other.by_tilt);
   }
 };
 
@@ -168,6 +170,9 @@ class Interaction {
 
   /// Uses these kernels, which give the same bits, instead of the widest of this machine. Fields use no kernels.
   virtual void use(const PairKernels&) {}
+
+  /// Whether the term acts through images that slide, in a sheared box.
+  virtual bool knows_shear() const { return false; }
 
   /// Whether the term is invariant under translation, so that it conserves the total momentum.
   virtual bool keeps_momentum() const { return true; }

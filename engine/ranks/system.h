@@ -22,6 +22,20 @@ struct Quanta {
   double energy = 0;  ///< 2^-46 of the smallest scale of their energies [energy]
 };
 
+/// Keeps unwrapped positions where the tilt of their box has become this number of edges shorter. Throws
+/// Error(Failure::numerical) for images that cannot be counted.
+template <int D>
+void renumber_images(Particles<D>& particles, std::int32_t boxes) {
+  for (std::size_t i = 0; boxes != 0 && i < particles.image.size(); ++i) {
+    const std::int64_t x = particles.image[i][0] + std::int64_t{boxes} * particles.image[i][1];
+    if (std::abs(x) > std::numeric_limits<std::int32_t>::max())
+      throw Error(Failure::numerical,
+                  "the flow has carried a particle across the periodic box more often than 32 bits can count; end the "
+                  "run earlier, or start a new one from its last state");
+    particles.image[i][0] = static_cast<std::int32_t>(x);
+  }
+}
+
 /// Must be on the heap and never move: interactions refer to its box and particles, the registry to its arrays.
 template <int D>
 struct System {
@@ -70,9 +84,10 @@ struct System {
     fields.add("spin", particles.spin);
   }
 
-  /// Wraps all particles into the periodic box. Called only at the ends of slabs. Throws Error(failure) if a particle
-  /// has crossed it too often to count.
+  /// Wraps all particles into the periodic box, and shortens its tilt. Called only at the ends of slabs. Throws
+  /// Error(failure) if a particle has crossed it too often to count.
   void wrap(Failure failure = Failure::numerical) {
+    if (box.sheared()) renumber_images(particles, box.shorten_tilt());
     for (std::size_t i = 0; i < particles.size(); ++i) box.wrap(particles.x[i], particles.image[i], failure);
   }
 

@@ -66,7 +66,7 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
   if (system.keeps_momentum()) statistics.max_momentum_error = 0;
   for (auto* observer : observers)
     if (observer->sampling().interval > 0) samplers_.push_back({observer, Schedule(observer->sampling())});
-  if (info.shadow) statistics.max_shadow_energy_error = 0;
+  if (has_shadow()) statistics.max_shadow_energy_error = 0;
   std::map<std::string, Id> columns;
   for (const Wall<D>& wall : system.box.walls()) {
     column_of_wall_.resize(wall.number + 1);
@@ -109,7 +109,7 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
       [this] {
         const Particles<D>& p = system_.particles;
         if (info_.hard_cores) touching_.emplace(pairs_within_reach(system_, p));
-        if (info_.shadow) scratch_.resize(p.size());
+        if (has_shadow()) scratch_.resize(p.size());
       });
 }
 
@@ -119,7 +119,7 @@ void Monitor<D>::start(const Integrator<D>& integrator, bool fresh) {
   for (Schedule* schedule : {&frames_, &rows_}) schedule->pass(time - plan_.slack());
   if (!waits())
     for (Sampler& sampler : samplers_) sampler.due.pass(time - plan_.slack());
-  shot_ = measure(time, system_.particles, &integrator, info_.shadow, fresh);
+  shot_ = measure(time, system_.particles, &integrator, has_shadow(), fresh);
   statistics_.energy_initial = statistics_.energy_final = shot_.total();
   if (system_.box.contacts.rough()) statistics_.rotational_energy = shot_.rotational;
   account_.first_momentum = shot_.momentum;
@@ -217,7 +217,7 @@ void Monitor<D>::end_of_slab(double elapsed, const Integrator<D>& integrator, bo
   const bool soon = due || s.steps == s.start_steps + 1 || !info_.stepping || !system_.decomposition.joined() ||
                     (waits() && transient_end_);
   const bool with_shadow =
-      info_.shadow && (due || s.steps == s.start_steps + 1 || system_.size() <= kShadowAtEveryStep);
+      has_shadow() && (due || s.steps == s.start_steps + 1 || system_.size() <= kShadowAtEveryStep);
   Waiting& slab = waiting_.emplace_back(observed(s.end_time, system_.particles, &integrator, with_shadow));
   slab.elapsed = elapsed;
   OverlapTally& at_contacts = statistics_.counters;

@@ -120,6 +120,8 @@ class Monitor {
     const Waiting now = observed(time, state, integrator, with_shadow, fresh);
     return measured(now, system_.decomposition.sum(now.own));
   }
+  /// Whether the method has a shadow energy, which is known for boxes without shear.
+  bool has_shadow() const { return info_.shadow && !system_.box.sheared(); }
   void settle();
   void take(const Waiting& slab, const Sums& sums);
   void show(Snapshot<D> shot, bool last);

@@ -215,7 +215,9 @@ template <int D>
 void Simulation<D>::begin(const Hooks& hooks) {
   Statistics& s = statistics_;
   Decomposition<D>& decomposition = system_->decomposition;
-  const auto divide = [&] { return decomposition.divide(info_.local, plan_.step, info_.hard_cores); };
+  const auto divide = [&] {
+    return decomposition.divide(info_.local && !system_->box.sheared(), plan_.step, info_.hard_cores);
+  };
   const auto make_monitor = [&] {
     monitor_ = std::make_unique<Monitor<D>>(*system_, info_, plan_, observers_, s);
     system_->fields.add_value("quiet since", quiet_since_);
@@ -370,8 +372,10 @@ bool Simulation<D>::fly(Slab& slab, SlabReport<D>& report, SlabWatch& watch) {
   };
   // In free flight this is not checked here: the epoch may end after a number of collisions, before the walls meet.
   if (const std::string what = info_.stepping ? no_room_text(slab.length) : ""; !what.empty()) throw error(what);
+  const double tilt = system_->box.tilt;
   for (Counters before = report.counters;;) try {  // until it returns or throws
       watch.begin();
+      system_->box.tilt = tilt;
       system_->box.begin_step(slab.start, info_.stepping ? slab.length : 0);
       if (!system_->box.options.empty()) system_->box.check(Failure::numerical);
       check_rates(system_->box, slab, info_.stepping);
@@ -397,6 +401,7 @@ bool Simulation<D>::fly(Slab& slab, SlabReport<D>& report, SlabWatch& watch) {
       slab = next_slab();
     } catch (SlabLeft) {
       watch.restore();
+      system_->box.tilt = tilt;
       report.counters = before;
       return false;
     } catch (const Error& e) {

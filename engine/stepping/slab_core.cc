@@ -70,7 +70,7 @@ void SlabCore<D>::begin(Positions<D> v, Positions<D> a, double length, bool reso
   }
   margin_ = own_longest_path_ = 0;
   for (Id i = 0; i < n; ++i) {
-    const double straight = length * v[i].norm(), bent = 0.5 * length * length * acceleration(i).norm();
+    const double straight = length * beside_flow(i, v[i]).norm(), bent = 0.5 * length * length * acceleration(i).norm();
     longest_path_of_[i] = kPathMargin * (straight + bent);
     margin_ = bent <= most_bend_ ? std::max(margin_, longest_path_of_[i]) : kNever;
     if (particles_.owns(i)) own_longest_path_ = std::max(own_longest_path_, longest_path_of_[i]);
@@ -94,7 +94,10 @@ void SlabCore<D>::reject_wide_margin() {
 template <int D>
 void SlabCore<D>::find_near() {
   const auto& x = particles_.x;
-  pairs_ = scan_->list().cover(x, margin_);
+  const double stretch = this->stretch();
+  // The list adds two margins to the contact distance.
+  const double wide = box_.sheared() ? (stretch - 1) * *std::ranges::max_element(particles_.radius) : 0;
+  pairs_ = scan_->list().cover(x, box_.sheared() ? stretch * margin_ + wide : margin_);
   near_.clear();
   for (std::uint32_t k = 0; k < pairs_.size(); ++k) {
     const auto& [i, j, image] = pairs_[k];
@@ -102,11 +105,12 @@ void SlabCore<D>::find_near() {
     const double radii = particles_.radius[i] + particles_.radius[j],
                  sigma = steps ? steps->farthest(radii) : scan_->contact_distance(i, j);
     const double touching = sigma + scan_->tolerance(sigma);
-    const double near = touching + longest_path_of_[i] + longest_path_of_[j];
+    const double near = stretch * (touching + longest_path_of_[i] + longest_path_of_[j]);
     const Vec<D> d = x[i] - x[j] + box_.shift(image);
     if (!(d.squaredNorm() <= near * near)) continue;
     // Each path bends off its straight line by no more than largest_bend_.
-    const Vec<D> v = start_v_[i] - start_v_[j];
+    Vec<D> v = start_v_[i] - start_v_[j];
+    v[0] += box_.offset(image).slide;
     const double b = d.dot(v), passing = touching + largest_bend_[i] + largest_bend_[j];
     const double closest = b < 0 ? std::min(length_, -b / v.squaredNorm()) : 0.0;
     if ((d + closest * v).squaredNorm() <= passing * passing) near_.push_back(k);
@@ -208,7 +212,7 @@ void SlabCore<D>::plain_ends() {
     if (!(bent.squaredNorm() <= largest_bend_[i] * largest_bend_[i])) beyond_.push_back(static_cast<Id>(i));
   }
   for (const Id i : beyond_)
-    if (const double far = path(start_v_[i], a_[i], h); !(far <= margin_))
+    if (const double far = path(beside_flow(i, start_v_[i]), a_[i], h); !(far <= margin_))
       note_path(half * a_[i].norm() <= most_bend_ ? far : kNever);
 }
 
@@ -304,8 +308,11 @@ void SlabCore<D>::predict_all(Id i) {
 template <int D>
 void SlabCore<D>::predict_pair(Id i, Id j, const Image<D>& image) {
   const double t = std::max(start(i), start(j)), sigma = scan_->contact_distance(i, j), time_left = length_ - t;
-  const Vec<D> d = position(i, t) - position(j, t) + box_.shift(image);
-  const Vec<D> v_i = velocity(i, t), v_j = velocity(j, t), v = v_i - v_j;
+  const Vec<D> d = position(i, t) - position(j, t) + box_.shift_after(image, t);
+  const Vec<D> v_i = velocity(i, t), v_j = velocity(j, t);
+  Vec<D> v = v_i - v_j;
+  if (box_.sheared()) [[unlikely]]
+    v[0] += box_.offset(image).slide;
   const PairSteps* const steps = has_steps_ ? scan_->steps(i, j) : nullptr;
   const bool touching = scan_->touches(d, sigma);
   const double slack =
@@ -377,8 +384,10 @@ struct SlabCore<D>::Meeting {
       sigma = core.particles_.radius[key.lo];
       return;
     }
-    normal = core.position(key.lo, key.time) - core.position(key.hi, key.time) + core.box_.shift(key.image);
+    normal =
+        core.position(key.lo, key.time) - core.position(key.hi, key.time) + core.box_.shift_after(key.image, key.time);
     v_hi = core.velocity(key.hi, key.time);
+    v_hi[0] -= core.box_.offset(key.image).slide;
     speed = normal.dot(v_lo - v_hi) / normal.norm();
     sigma = core.scan_->contact_distance(key.lo, key.hi);
     hard.distance = sigma;
@@ -496,8 +505,7 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
                       box_.contacts.need_internal() ? &f.internal : nullptr};
   };
   const auto checks_path = [&](const Flight& f) {
-    const double far = (f.x - particles_.x[f.id]).norm() + path(f.v, acceleration(f.id), length_ - f.t);
-    if (!(far <= margin_)) note_path(far);
+    if (const double far = farthest(f); !(far <= margin_)) note_path(far);
   };
   if (key.kind == EventKind::wall) {
     const Wall<D> wall = box_.wall(key.hi).at(lo.x);
@@ -511,8 +519,11 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     contact.x_hi = wall.foot(lo.x, key.time);
   } else {
     Flight& hi = flights_[slot_[key.hi] - 1];
-    const Vec<D> d = lo.x - hi.x + box_.shift(key.image), v = lo.v - hi.v;
-    contact.x_hi = hi.x - box_.shift(key.image);
+    const Vec<D> shift = box_.shift_after(key.image, key.time), d = lo.x - hi.x + shift;
+    const double slide = box_.offset(key.image).slide;
+    Vec<D> v = lo.v - hi.v;
+    v[0] += slide;
+    contact.x_hi = hi.x - shift;
     const StepSurface* const step = has_steps_ ? step_of(key) : nullptr;
     if (step ? step->tether() && !(d.dot(v) > 0) : !(d.dot(v) < 0)) return;
     const double m_lo = particles_.mass[key.lo], m_hi = particles_.mass[key.hi];
@@ -523,11 +534,14 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     contact.exchange = {.virial = (contact.x_lo - contact.x_hi).dot(impulse.factor * d),
                         .dissipated = impulse.dissipated,
                         .stored = impulse.stored,
+                        .shear = -slide * contact.impulse[0],
                         .event = impulse.event};
     contact.v_hi = hi.v;
+    contact.v_hi[0] -= box_.flow(hi.x);
     checks_path(hi);
   }
   contact.v_lo = lo.v;
+  contact.v_lo[0] -= box_.flow(lo.x);
   checks_path(lo);
   contacts_.push_back(contact);
 }
@@ -566,8 +580,7 @@ void SlabCore<D>::compare_ranks(bool failed) {
   for (const Id i : beyond_)
     if (particles_.owns(i)) farthest = std::max(farthest, path(start_v_[i], a_[i], length_));
   for (const Flight& f : flights_)
-    if (particles_.owns(f.id))
-      farthest = std::max(farthest, (f.x - particles_.x[f.id]).norm() + path(f.v, acceleration(f.id), length_ - f.t));
+    if (particles_.owns(f.id)) farthest = std::max(farthest, this->farthest(f));
   decomposition.ranks().combine(most, counts_);
   if (any_left > 0) throw SlabLeft{};
   if (any_failed > 0) throw HaloTooSmall{};

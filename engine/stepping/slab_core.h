@@ -60,9 +60,9 @@ class SlabCore {
     scan_->begin_step(counters, contacts, a, length, watch, already);
   }
 
-  /// Finds the pairs that may meet in a slab of this length [time], from the system's positions with velocities v,
-  /// under accelerations a or others not much larger. `resolved`: ContactScan::resolve() has handled the contacts at
-  /// the start.
+  /// Finds the pairs that may meet in a slab of this length [time], from the system's positions with velocities v (in
+  /// the laboratory, also in a sheared box), under accelerations a or others not much larger. `resolved`:
+  /// ContactScan::resolve() has handled the contacts at the start.
   void begin(Positions<D> v, Positions<D> a, double length, bool resolved = false);
 
   /// Flies from the start of the slab to its end, straight if `a` is empty. Throws SlabLeft if the run is to stop.
@@ -95,7 +95,7 @@ class SlabCore {
     particles.v.swap(v_);
     if (box_.contacts.need_internal())
       for (const Flight& each : flights_) particles.set_internal(each.id, each.internal);
-    system_.box.time += length_;
+    system_.box.advance(length_);
   }
 
   /// The contacts at the slab's start, and the resting ones.
@@ -151,6 +151,23 @@ class SlabCore {
   void collide(const EventKey<D>& key);
   Flight& flight(Id i, const EventKey<D>& key);
   double path(const Vec<D>& v, const Vec<D>& a, double time) const { return time * (v.norm() + 0.5 * time * a.norm()); }
+  /// The velocity of particle i relative to the flow where it was at the slab's start.
+  Vec<D> beside_flow(Id i, Vec<D> v) const {
+    v[0] -= box_.flow(particles_.x[i]);
+    return v;
+  }
+  /// How far particle i may come in this slab from where the flow carries it, if its flight f goes on.
+  double farthest(const Flight& f) const {
+    Vec<D> moved = f.x - particles_.x[f.id];
+    moved[0] -= f.t * box_.flow(particles_.x[f.id]);
+    return moved.norm() + path(beside_flow(f.id, f.v), acceleration(f.id), length_ - f.t);
+  }
+  /// How much farther two particles may be apart at the start of the slab than they will come in the flow, relatively:
+  /// the largest singular value of its strain, as in engine/search/flow_frame.h.
+  double stretch() const {
+    const double half = 0.5 * std::abs(box_.shear_rate) * length_;
+    return half + std::sqrt(1 + half * half);
+  }
   /// Records the length of a path that exceeds margin_.
   void note_path(double path) { longest_path_ = std::isnan(path) ? kNever : std::max(longest_path_, path); }
   void compare_sequences();

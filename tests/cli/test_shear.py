@@ -207,8 +207,7 @@ BAD = {
                "placement": {"type": "random", "seed": 1},
                "wall": [{"name": "ball", "shape": "sphere", "centre": [6.0, 6.0, 6.0], "radius": 1.5, "inside": False}]},
               "parallel to the axis"),
-    "forces": ({"interaction": [{"type": "yukawa", "amplitude": 1.0, "kappa": 2.0, "cutoff": 2.0}], "contact": [],
-                "integrator": {"type": "edda", "step": 0.01}}, "'edda' knows no shear yet; take free-flight"),
+    "method": ({"contact": [], "integrator": {"type": "cdda", "step": 0.01}}, "'cdda' knows no shear yet; take free-flight"),
     "field": ({"interaction": [{"type": "uniform-field", "acceleration": [0.0, -1.0, 0.0]}]}, "'acceleration' has a component along axis 1, which is periodic"),
     "steps": ({"step": [{"between": ["grain", "grain"], "range": 1.5, "depth": 1.0}]}, "'shear' does not go with [[step]] yet"),
     "no number": ({"system": FLUID["system"] | {"shear": {"rate": math.inf}}}, "'rate' must be finite"),
@@ -221,7 +220,7 @@ BAD = {
     "tilt": ({"system": FLUID["system"] | {"box": [12.0, 12.0, 12.0], "tilt": 12.0}, "placement": {"type": "random", "seed": 1}},
              "'tilt' is not between 0 and the edge along x"),
     "tilt without free flight": ({"system": {"dimension": 3, "boundary": ["periodic"] * 3, "tilt": 1.0},
-                                  "integrator": {"type": "psa", "step": 0.01}}, "'psa' knows no shear yet"),
+                                  "integrator": {"type": "cva", "step": 0.01}}, "'cva' knows no shear yet"),
     "waves": ({"output": FLUID["output"] | {"sk_interval": 1.0}}, "sk does not go with 'shear' yet"),
     "displacements": ({"output": FLUID["output"] | {"msd_interval": 1.0}}, "msd does not go with 'shear' yet")}
 

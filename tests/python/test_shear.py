@@ -33,8 +33,8 @@ def test_a_flow_begins_and_ends():
     assert sim.tilt == tilted > 0
     sim.run(time=1.0)
     assert sim.temperature == pytest.approx(hot, rel=1e-13) and sim.tilt == tilted and sim.work == 0
-    sim.integrator("psa", step=0.01)
-    with pytest.raises(carom.UsageError, match="'psa' knows no shear yet"):
+    sim.integrator("cva", step=0.01)
+    with pytest.raises(carom.UsageError, match="'cva' knows no shear yet"):
         sim.run(time=1.0)
     with pytest.raises(carom.UsageError, match="tilt is not between 0 and the edge"):
         sim.tilt = -1

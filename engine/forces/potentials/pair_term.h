@@ -116,6 +116,7 @@ class PairTerm final : public Interaction<D> {
     pairs_.use(kernels);
   }
   Tail tail() const override { return tail_; }
+  bool knows_shear() const override { return pairs_.knows_shear(); }
   const PairList* bonds() const override {
     if constexpr (std::same_as<Pairs, Bonds<D>>)
       return &pairs_.list();
@@ -223,6 +224,8 @@ class PairTerm final : public Interaction<D> {
       } else if (forces) {
         kernels_->scatter(*batch_, batch_->low, low);
         if (wide) kernels_->scatter(*batch_, batch_->high, pairs_.high(*forces));
+        if (pairs_.sheared()) [[unlikely]]
+          forces->add_by_tilt(by_tilt(wide));
       }
       if (!given.x_new.empty()) own += batch_->n;
     };
@@ -257,6 +260,18 @@ class PairTerm final : public Interaction<D> {
       sums->virial.add(virial);
     });
     return own;
+  }
+
+  /// −Σ n F_x of the batch in quanta, where n is the number of the image along y: the tilt moves it by n.
+  typename ForceSums<D>::Whole by_tilt(bool wide) const {
+    typename ForceSums<D>::Whole sum = 0;
+    for (unsigned k = 0; k < batch_->n; ++k) {
+      const auto above = static_cast<std::int64_t>(batch_->above[k]);
+      if (above == 0) continue;
+      sum -= static_cast<typename ForceSums<D>::Whole>(above) * batch_->low[0][k];
+      if (wide) sum -= (static_cast<typename ForceSums<D>::Whole>(above) * batch_->high[0][k]) << kHighShift;
+    }
+    return sum;
   }
 
   /// Names the pair of the batch with the largest force, or one with a NaN force.

@@ -86,6 +86,8 @@ class Bonds {
       for (const Id i : pair) most_partners_ = std::max(most_partners_, ++partners[i]);
   }
 
+  bool sheared() const { return box_.sheared(); }
+  bool knows_shear() const { return true; }
   const PairList& list() const { return pairs_; }
 
   std::optional<Bonds> among(const Particles<D>& some) const {
@@ -107,7 +109,7 @@ class Bonds {
   }
   double reach(Positions<D> x) const {
     double longest = 0;
-    for (const auto& [i, j] : pairs_) longest = std::max(longest, (x[i] - x[j] + shift_of(i, j, x)).norm());
+    for (const auto& [i, j] : pairs_) longest = std::max(longest, (x[i] - x[j] + box_.shift(image_of(i, j, x))).norm());
     return longest;
   }
   double reach(const Particles<D>& block, Communicator& ranks) const {
@@ -139,14 +141,16 @@ class Bonds {
     for (const auto& [i, j] : pairs_) {
       if (step.changed && step.changed[i] == 0 && step.changed[j] == 0) continue;
       if (!particles.evaluates(i, j)) continue;
-      const Vec<D> shift = shift_of(i, j, step.x), d = step.x[i] - step.x[j] + shift;
+      const Image<D> image = image_of(i, j, step.x);
+      const Vec<D> d = step.x[i] - step.x[j] + box_.shift(image);
       batch.begin_row(i);
       for (int k = 0; k < 3; ++k) batch.d[k][batch.n] = k < D ? d[k] : 0;
       if (!step.x_new.empty() || !step.vectors.empty()) {
-        const Vec<D> d_new = step.vectors.empty() ? Vec<D>(step.x_new[i] - step.x_new[j] + shift)
+        const Vec<D> d_new = step.vectors.empty() ? Vec<D>(step.x_new[i] - step.x_new[j] + box_.next_shift(image))
                                                   : Vec<D>(step.vectors[i] - step.vectors[j]);
         for (int k = 0; k < 3; ++k) batch.d_new[k][batch.n] = k < D ? d_new[k] : 0;
       }
+      batch.above[batch.n] = image[1];
       batch.weight[batch.n] = step.weight ? (*step.weight)[i] * (*step.weight)[j] : 1;
       batch.second[batch.n++] = j;
       if (batch.n == PairBatch::kCapacity) flush();
@@ -161,18 +165,19 @@ class Bonds {
   void use(const PairKernels&) {}
 
  private:
-  /// The shift of the image in which the bond is at x.
-  Vec<D> shift_of(Id i, Id j, Positions<D> x) const {
+  /// The image in which the bond is at x.
+  Image<D> image_of(Id i, Id j, Positions<D> x) const {
     const Vec<D> straight = x[i] - x[j];
-    if ((straight.array().abs() <= kMaxBondLength * box_.edges.array()).all()) return Vec<D>::Zero();
-    Vec<D> shift = box_.shift(box_.nearest_image(straight));
+    if ((straight.array().abs() <= kMaxBondLength * box_.edges.array()).all()) return {};
+    const Image<D> image = box_.nearest_image(straight);
+    const Vec<D> shift = box_.shift(image);
     for (int k = 0; k < D; ++k)
       if (box_.periodic(k) && std::abs(straight[k] + shift[k]) > kMaxBondLength * box_.edges[k])
         throw Error(Failure::numerical, "the bond of particles " + std::to_string(ids_.empty() ? i : ids_[i]) +
                                             " and " + std::to_string(ids_.empty() ? j : ids_[j]) +
                                             " spans nearly half the periodic box along axis " + std::to_string(k) +
                                             ", where its image is ambiguous; use a larger box");
-    return shift;
+    return image;
   }
 
   static constexpr double kMaxBondLength = 0.48;  // longest bond along a periodic axis [edge]
@@ -191,6 +196,8 @@ class AllPairs {
   AllPairs(const Box<D>& box, std::size_t particles, PairFilter filter)
       : box_(box), particles_(particles), filter_(std::move(filter)) {}
 
+  bool sheared() const { return false; }
+  bool knows_shear() const { return false; }
   std::optional<AllPairs> among(const Particles<D>& some) const {
     if (some.size() < particles_) return std::nullopt;
     return AllPairs(box_, particles_, filter_.among(some));
@@ -270,6 +277,13 @@ class PairsWithinCutoff {
   PairsWithinCutoff(const Box<D>& box, double cutoff, PairFilter filter, const CutoffList<D>* like = nullptr)
       : box_(box), cutoff_(cutoff), filter_(filter), list_(box, cutoff, std::move(filter), like) {}
 
+  bool sheared() const { return box_.sheared(); }
+  /// Own images, which slide relative to each other, are not known.
+  bool knows_shear() const {
+    for (int k = 0; k < D; ++k)
+      if (box_.periodic(k) && !(cutoff_ < box_.edges[k])) return false;
+    return true;
+  }
   std::optional<PairsWithinCutoff> among(const Particles<D>& some) const {
     return PairsWithinCutoff(box_, cutoff_, filter_.among(some), &list_);
   }

@@ -120,7 +120,7 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
     const PairRecord &own = rows.x[run.row], &own_new = extra == Extra::nothing ? own : rows.x_new[run.row];
     const V x = all<V>(own.x), y = all<V>(own.y), z = all<V>(own.z), w = all<V>(own.w);
     const V x_new = all<V>(own_new.x), y_new = all<V>(own_new.y), z_new = all<V>(own_new.z);
-    V image[3], shift[3];
+    V image[3], shift[3], shift_new = {}, above = {};
     for (int k = 0; k < 3; ++k) {
       const double* const box = moving ? &rows.box[run.row].x : nullptr;
       image[k] = all<V>(run.image[k] - (moving ? box[k] : 0));
@@ -145,6 +145,14 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
         shift[0] = (image[0] + box.x) * rows.edges[0];
         shift[1] = (image[1] + box.y) * rows.edges[1];
         shift[2] = (image[2] + box.z) * rows.edges[2];
+        if (rows.sheared) [[unlikely]] {
+          above = image[1] + box.y;
+          const V whole = ((image[0] + box.x) + above * rows.turns) * rows.edges[0];
+          shift[0] = whole + above * rows.tilt[0];
+          shift_new = whole + above * rows.tilt[1];
+        } else {
+          shift_new = shift[0];
+        }
       }
       const V dx = (x - other.x) + shift[0], dy = (y - other.y) + shift[1], dz = (z - other.z) + shift[2];
       const V rho = dx * dx + dy * dy + dz * dz;
@@ -154,7 +162,7 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
         const auto after = transposed<V>([&](int l) __attribute__((always_inline)) { return rows.x_new + j[l]; });
         ex = x_new - after.x, ey = y_new - after.y, ez = z_new - after.z;
         if constexpr (extra == Extra::step) {
-          ex += shift[0], ey += shift[1], ez += shift[2];
+          ex += moving ? shift_new : shift[0], ey += shift[1], ez += shift[2];
           mask |= less(ex * ex + ey * ey + ez * ez, cutoff);
         }
       }
@@ -172,6 +180,8 @@ bool collect_pairs(const PairRows& rows, PairCursor& cursor, PairBatch& batch) {
         compress(batch.d_new[2] + n, mask, ez);
       }
       if constexpr (weighted) compress(batch.weight + n, mask, product);
+      if (moving && rows.sheared) [[unlikely]]
+        compress(batch.above + n, mask, above);
       compress<W>(batch.second + n, mask, load<typename Width<W>::Unsigned>(j));
       n += bits_in<W>(mask);
     }

@@ -34,6 +34,9 @@ struct PairRows {
   const PairRun* run = nullptr;
   std::size_t runs = 0;
   double edges[3] = {0, 0, 0};
+  bool sheared = false;     ///< images along y are displaced along x, see Box; then all pairs have box numbers
+  double turns = 0;         ///< the number of edges by which the tilt has become shorter since the images were found
+  double tilt[2] = {0, 0};  ///< for x and for x_new
   double cutoff_squared = 0;
   bool weighted = false;  ///< multiply the weights and omit pairs of zero weight
 };
@@ -53,6 +56,7 @@ struct PairBatch {
   alignas(64) double d[3][kPaddedCapacity];      ///< separation, first minus second
   alignas(64) double d_new[3][kPaddedCapacity];  ///< new separation, or difference of vectors
   alignas(64) double weight[kPaddedCapacity];
+  alignas(64) double above[kPaddedCapacity];          ///< the number of the image along y, in sheared boxes
   alignas(64) std::int64_t low[3][kPaddedCapacity];   ///< force on the first particle, in quanta
   alignas(64) std::int64_t high[3][kPaddedCapacity];  ///< high words, if two words are used
   std::uint32_t second[kCapacity + 16];
