@@ -221,14 +221,19 @@ def random_deck(dice, seconds):
     if method in ("cdda", "edda") and (dice.random() < 0.4):
         integrator["accuracy"] = dice.choice([1e-2, 1e-3, 1e-4])
     system = {"dimension": dimension, "boundary": boundary}
-    if method == "free-flight" and boundary[:2] == ["periodic", "periodic"] and dice.random() < 0.5:
+    forces = random_forces(dice, method, dimension, boundary, [each["name"] for each in particles])
+    if method in ("free-flight", "psa", "verlet", "edda") and boundary[:2] == ["periodic", "periodic"] and dice.random() < 0.5:
         system["shear"] = {"rate": dice.choice([-1, 1]) * 10**dice.uniform(-1.5, 0.5)}
         steps = []
         output.pop("msd_interval", None)
+        if method != "free-flight":
+            contacts = []
+            walls = [wall for wall in walls if "temperature" not in wall]
+            forces = [force for force in forces if force["type"] in ("harmonic-bond", "wca") or force.get("cutoff", np.inf) < length]
     return {"format": 1, "system": system,
             "wall": walls, "contact": contacts, "step": steps, "bath": [bath] if bath else [], "particles": particles,
             "placement": {"type": lattice, "packing_fraction": packing, "seed": dice.randrange(1000)},
-            "interaction": random_forces(dice, method, dimension, boundary, [each["name"] for each in particles]),
+            "interaction": forces,
             "integrator": integrator, "run": run, "output": output}
 
 

@@ -198,9 +198,9 @@ TEST(PairSums, PassOverManyPairsOfNoWeight) {
                    Yukawa(2, 0.1), std::numeric_limits<double>::infinity(), &scene.particles.charge, x, x);
 }
 
-/// Moves particles, sometimes wraps them, and compares with simple loops after each step.
+/// Moves particles, sometimes wraps them, and compares with simple loops after each step, also in a flow of this rate.
 template <int D>
-void travel(double edge, int particles, double speed, const std::string& width) {
+void travel(double edge, int particles, double speed, const std::string& width, double rate = 0) {
   SCOPED_TRACE(width);
   setenv("CAROM_SIMD", width.c_str(), 1);
   Scene<D> scene(particles, edge, Boundary::periodic, 0.4);
@@ -210,15 +210,26 @@ void travel(double edge, int particles, double speed, const std::string& width) 
   const Cut potential(Yukawa(1.0, 1.1), 1.2, CutKind::shifted);
   auto x = scene.particles.x;
   const auto drift = scene.random_vectors(speed);
+  Box<D>& box = scene.box;
+  box.shear_rate = rate;
+  const auto moved = [&](const std::vector<Vec<D>>& from, double time) {
+    auto to = test::displaced(from, drift, time);
+    for (std::size_t i = 0; i < to.size(); ++i) to[i][0] += time * box.flow(from[i]);
+    return to;
+  };
+  std::int32_t turns = 0;
   for (int step = 0; step < 30; ++step) {
-    x = test::displaced(x, drift, 1);
+    x = moved(x, 1);
+    box.advance(1);
+    if (step % 3 == 2) turns += std::abs(box.shorten_tilt());
     if (step % 3 == 2)
       for (auto& each : x) {
         Image<D> image{};
         scene.box.wrap(each, image);
       }
     if (step == 20) x[5][0] += 3 * edge;
-    const auto x_new = test::displaced(x, drift, step % 4);
+    const auto x_new = moved(x, step % 4);
+    box.next_tilt = box.tilt + step % 4 * box.slide();
     ForceSums<D> forces(x.size(), kQuantum), mean(x.size(), kQuantum);
     travelled->add_forces(x, forces);
     travelled->add_mean_forces(x, x_new, mean);
@@ -229,7 +240,11 @@ void travel(double edge, int particles, double speed, const std::string& width) 
     }
     ASSERT_TRUE(quanta(forces) == expected.forces) << "step " << step;
     ASSERT_TRUE(quanta(mean) == expected.mean_forces) << "step " << step;
+    const auto by_tilt = [](typename ForceSums<D>::Whole sum) { return static_cast<double>(sum) * kQuantum; };
+    ASSERT_EQ(forces.by_tilt().value(), rate == 0 ? 0 : by_tilt(expected.by_tilt)) << "step " << step;
+    ASSERT_EQ(mean.by_tilt().value(), rate == 0 ? 0 : by_tilt(expected.mean_by_tilt)) << "step " << step;
   }
+  EXPECT_EQ(turns > 0, rate != 0);
 }
 
 TEST(PairSums, DoNotDependOnTheHistoryOfTheList) {
@@ -238,6 +253,8 @@ TEST(PairSums, DoNotDependOnTheHistoryOfTheList) {
     travel<2>(6, 60, 0.07, width);
     travel<3>(4, 90, 0.02, width);
     travel<3>(1.5, 12, 0.03, width);
+    travel<2>(6, 60, 0.01, width, 0.04);
+    travel<3>(4, 90, 0.02, width, -0.04);
   }
 }
 

@@ -54,7 +54,8 @@ struct Reference {
   using Whole = typename ForceSums<D>::Whole;
   Quanta<D> forces, mean_forces;
   Whole energy = 0;
-  double own = 0, own_size = 0;  // Σ U and Σ |U| between particles and their own images
+  Whole by_tilt = 0, mean_by_tilt = 0;  // −Σ n F_x, n the number of the image along the second axis
+  double own = 0, own_size = 0;         // Σ U and Σ |U| between particles and their own images
 
   template <class P>
   Reference(const Scene<D>& scene, const P& potential, double cutoff2, const std::vector<double>* weight,
@@ -68,7 +69,8 @@ struct Reference {
         for (int n = 0; n < static_cast<int>(std::pow(2 * images + 1, D)); ++n) {
           Image<D> image;
           for (int k = 0, rest = n; k < D; ++k, rest /= 2 * images + 1) image[k] = rest % (2 * images + 1) - images;
-          const Vec<D> shift = scene.box.shift(image), d = x[i] - x[j] + shift, d_new = x_new[i] - x_new[j] + shift;
+          const Vec<D> shift = scene.box.shift(image), d = x[i] - x[j] + shift,
+                       d_new = x_new[i] - x_new[j] + scene.box.next_shift(image);
           const double rho = d.squaredNorm(), rho_new = d_new.squaredNorm();
           const double w = weight ? (*weight)[i] * (*weight)[j] : 1;
           if (w == 0) continue;
@@ -81,10 +83,12 @@ struct Reference {
           if (rho < cutoff2) {
             energy += rounded(w * potential.value(rho));
             for (int k = 0; k < D; ++k) add(forces, i, j, k, rounded(-2.0 * w * potential.derivative(rho) * d[k]));
+            by_tilt -= image[1] * rounded(-2.0 * w * potential.derivative(rho) * d[0]);
           }
-          if (rho < cutoff2 || rho_new < cutoff2)
-            for (int k = 0; k < D; ++k)
-              add(mean_forces, i, j, k, rounded(-w * potential.quotient(rho, rho_new) * (d[k] + d_new[k])));
+          if (!(rho < cutoff2 || rho_new < cutoff2)) continue;
+          const auto mean = [&](int k) { return rounded(-w * potential.quotient(rho, rho_new) * (d[k] + d_new[k])); };
+          for (int k = 0; k < D; ++k) add(mean_forces, i, j, k, mean(k));
+          mean_by_tilt -= image[1] * mean(0);
         }
   }
   static void add(Quanta<D>& sums, Id i, Id j, int k, Whole force) {
