@@ -80,6 +80,21 @@ def test_the_stress_by_the_work_is_that_of_the_pressure_tensor(tmp_path):
         assert stress == pytest.approx(-xy["pressure"], rel=within), deck["integrator"]
 
 
+def test_a_repulsive_fluid_as_another_program_has_it(tmp_path):
+    """LAMMPS (29 Sep 2021): 864 points with the repulsive part of Lennard-Jones, density 0.8442, temperature 0.722 by rescaling relative to the
+    flow in every step of 0.002 (compute temp/deform, fix temp/rescale), fix nve and fix deform at the erate 1 with remap v."""
+    fluid = SOFT | {"system": {"dimension": 3, "box": [10.077577148295044] * 3, "boundary": ["periodic"] * 3, "shear": {"rate": 1.0}},
+                    "particles": [{"name": "point", "count": 864, "temperature": 0.722}], "interaction": [{"type": "wca", "epsilon": 1.0, "sigma": 1.0}],
+                    "bath": [{"type": "rescaling", "temperature": 0.722, "rate": 500.0}], "integrator": {"type": "verlet", "step": 0.002}}
+    rows = thermo(ran(tmp_path, fluid, ["run.end_time=25", "output.thermo_interval=0.1", "output.frame_interval=0"]))
+    late = rows["time"] > 5
+    for column, wanted, error in (("shear_stress", 1.8091, 0.0034), ("pressure", 7.1412, 0.0033)):
+        parts = np.array_split(rows[column][late], 10)
+        means = np.array([part.mean() for part in parts])
+        assert means.mean() == pytest.approx(wanted, abs=4 * math.hypot(error, means.std(ddof=1) / 10**0.5)), column
+        assert means.std(ddof=1) / 10**0.5 < 0.01 * wanted
+
+
 def test_a_rate_of_zero_is_no_shear(tmp_path):
     for deck in (SOFT, YUKAWA, YUKAWA | {"integrator": {"type": "psa", "step": 0.005}}):
         still = deck | {"system": deck["system"] | {"shear": {"rate": 0.0}}}
