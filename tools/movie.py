@@ -7,7 +7,8 @@
     tools/movie.py runs/bound-cluster-3d --along y
 
 Writes a GIF, or an MP4 if the name ends with .mp4 and ffmpeg is installed. Walls are drawn solid, periodic edges dashed, open
-ones dotted, with their lengths at the axes; a disc that extends beyond a periodic edge is drawn on both sides. Spheres farther away are paler.
+ones dotted, with their lengths at the axes; a disc that extends beyond a periodic edge is drawn on both sides. Marks above and below a sheared
+box show where its images begin. Spheres farther away are paler.
 """
 
 import argparse
@@ -27,16 +28,19 @@ from carom_plot import caption
 LINE = {"wall": "-", "periodic": "--", "open": ":"}
 
 
-def with_images(x, radius, edges, periodic):
-    """The indices and positions of all discs to draw: discs over a periodic edge appear again on the other side."""
+def with_images(x, radius, edges, periodic, tilt=0.0):
+    """The indices and positions of all discs to draw: discs over a periodic edge appear again on the other side, displaced by the tilt."""
     index, x = np.arange(len(x)), x.copy()
-    for axis in np.flatnonzero(periodic):
+    for axis in np.flatnonzero(periodic)[::-1]:
         below = x[:, axis] < radius[index]
         above = x[:, axis] > edges[axis] - radius[index]
         shift = np.zeros(x.shape[1])
         shift[axis] = edges[axis]
+        shift[0] += tilt if axis == 1 else 0.0
         index = np.concatenate([index, index[below], index[above]])
         x = np.concatenate([x, x[below] + shift, x[above] - shift])
+        if axis == 1 and tilt:
+            x[:, 0] %= edges[0]
     return index, x
 
 
@@ -77,17 +81,25 @@ class Scene:
             near = np.clip(x[:, self.depth] / self.trajectory.edges(frame)[self.depth], 0, 1)
             colour[:, :3] = 1 - (1 - colour[:, :3]) * (0.25 + 0.75 * near[:, None])
         radius = self.trajectory.radius[order]
-        index, centres = with_images(x[order][:, self.plane], radius, self.edges, self.periodic)
+        tilt = self.trajectory.tilt(frame) if self.plane == [0, 1] else 0.0
+        index, centres = with_images(x[order][:, self.plane], radius, self.edges, self.periodic, tilt)
         if self.discs is not None:
             self.discs.remove()
         else:
             self._draw_box()
+        self._draw_images(self.trajectory.tilt(frame))
         diameter = 2 * radius[index]
         self.discs = self.axes.add_collection(EllipseCollection(
             diameter, diameter, np.zeros(len(index)), units="xy", offsets=centres, transOffset=self.axes.transData,
             facecolors=colour[order][index], edgecolors="black", linewidths=0.5))
         self.axes.set_title(f"{self.trajectory.title}\nt = {self.trajectory.time[frame]:.4g} [time]".strip(), fontsize=10)
         return [self.discs]
+
+    def _draw_images(self, tilt):
+        """Marks where the boxes above and below begin, in a sheared box that shows the plane of the flow."""
+        if tilt and self.plane == [0, 1]:
+            part, (x, y) = 0.04 * self.edges[1], self.edges
+            self.images.set_data([tilt, tilt, np.nan, x - tilt, x - tilt], [y, y + part, np.nan, 0, -part])
 
     def _draw_box(self):
         margin = 0.01 * max(self.high - self.low)
@@ -105,6 +117,7 @@ class Scene:
         for end in (0.0, 1.0):
             self.axes.plot(np.full(2, end * self.edges[0]), [0, self.edges[1]], style[0], color="black", linewidth=1.5)
             self.axes.plot([0, self.edges[0]], np.full(2, end * self.edges[1]), style[1], color="black", linewidth=1.5)
+        self.images, = self.axes.plot([], [], "-", color="black", linewidth=1.5, clip_on=False)
 
 
 @one_line

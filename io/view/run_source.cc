@@ -226,13 +226,14 @@ std::string RunSource::path(std::uint64_t particle, std::uint64_t first) const {
 
 std::string RunSource::frame(std::uint64_t number) {
   std::vector<float> x, v, spin;
-  double head[8] = {};
+  double head[9] = {};
   hdf5::read_between_flushes(trajectory_, [&] {
     const auto file = hdf5::File::open_unlocked(trajectory_);
     head[0] = hdf5::number_at(file, kParticles + "/position/time", number);
     head[1] = hdf5::number_at(file, kParticles + "/position/step", number);
     head[2] = hdf5::number_at(file, "/observables/collisions/value", number);
     for (int k = 0; k < 3; ++k) head[3 + k] = hdf5::diagonal_at(file, kParticles + "/box/edges/value", number, k);
+    head[8] = hdf5::rows<double>(file, kParticles + "/box/edges/value", number, 1).at(3);
     x = hdf5::rows<float>(file, kParticles + "/position/value", number, 1);
     v = hdf5::rows<float>(file, kParticles + "/velocity/value", number, 1);
     if (hdf5::exists(file, kParticles + "/angular_velocity"))

@@ -34,7 +34,8 @@ BONDED = YUKAWA | {
     "system": {"dimension": 2, "box": [18.0, 16.0], "boundary": ["periodic"] * 2, "shear": {"rate": -1.5}, "tilt": 4.0},
     "particles": [{"name": "disc", "radius": 0.4, "position": [[1.5 * k + 0.3, 1.6 * row + 0.3] for row in range(10) for k in range(12)],
                    "temperature": 1.0}],
-    "interaction": [{"type": "harmonic-bond", "stiffness": 30.0, "rest_length": 1.5, "pairs": [[12 * row + k, 12 * row + k + 1] for row in range(10) for k in range(11)]},
+    "interaction": [{"type": "harmonic-bond", "stiffness": 30.0, "rest_length": 1.5,
+                     "pairs": [[12 * row + k, 12 * row + k + 1] for row in range(10) for k in range(11)]},
                     YUKAWA["interaction"][0]]}
 BONDED.pop("placement")
 

@@ -257,10 +257,10 @@ def test_frames_are_those_of_the_trajectory(shown, finished):
         assert get(port, f"{path}0/path/{nowhere}")[0] == 404
     for frame in (3, 6, 1):  # forwards and backwards: counts of collisions too
         body = get(port, path + f"0/frame/{frame}")[1]
-        time_, _, collisions, *edges, counted, spins = struct.unpack("<8d", body[:64])
+        time_, _, collisions, *edges, counted, spins, tilt = struct.unpack("<9d", body[:72])
         assert (time_, collisions) == (group["position/time"][frame], file["observables/collisions/value"][frame])
-        assert np.array_equal(edges, np.diag(group["box/edges/value"][frame])) and (counted, spins) == (1, 0)
-        values = np.frombuffer(body[64:], "<f4")
+        assert np.array_equal(edges, np.diag(group["box/edges/value"][frame])) and (counted, spins, tilt) == (1, 0, 0)
+        values = np.frombuffer(body[72:], "<f4")
         assert np.array_equal(values[:324].reshape(-1, 3), group["position/value"][frame].astype("f4"))
         assert np.allclose(values[324:432], np.linalg.norm(group["velocity/value"][frame], axis=1), rtol=1e-6)
         so_far = events["time"][:] <= time_
@@ -271,13 +271,13 @@ def test_frames_are_those_of_the_trajectory(shown, finished):
     assert get(port, path + "0/rdf")[1] == (finished / "rdf.csv").read_bytes()
 
 
-def test_spins_are_those_of_the_trajectory(tmp_path):
-    run(write_deck(tmp_path, ROUGH), tmp_path / "run", ["output.events=true"])
+def test_spins_and_the_tilt_are_those_of_the_trajectory(tmp_path):
+    run(write_deck(tmp_path, ROUGH), tmp_path / "run", ["output.events=true", "system.shear={rate=0.5}"])
     group = h5py.File(tmp_path / "run" / "trajectory.h5md")["particles/trajectory"]
     with page("view", tmp_path / "run", "--no-browser") as (_, port, path):
         body = get(port, path + "0/frame/3")[1]
-    assert struct.unpack("<8d", body[:64])[6:] == (1, 1)
-    values = np.frombuffer(body[64:], "<f4").reshape(6, 108)
+    assert struct.unpack("<9d", body[:72])[6:] == (1, 1, group["box/edges/value"][3, 1, 0]) and group["box/edges/value"][3, 1, 0] > 0
+    values = np.frombuffer(body[72:], "<f4").reshape(6, 108)
     assert np.allclose(values[4], np.linalg.norm(group["angular_velocity/value"][3], axis=1), rtol=1e-6) and values[4].min() > 0
     assert values[5].max() > 1 and (values[5] == values[5].round()).all()
 
@@ -317,7 +317,7 @@ def test_a_run_that_is_shown_while_it_goes_on_is_the_same_run(killer, tmp_path):
     with h5py.File(tmp_path / "alone" / "trajectory.h5md") as file:
         for frame, body in seen.items():
             there = file["particles/trajectory/position/value"][frame].astype("<f4").tobytes()
-            assert body[64:64 + len(there)] == there
+            assert body[72:72 + len(there)] == there
     assert len(seen) > 2
     wait_until(lambda: not open_at(port))  # where there is no terminal
 

@@ -217,6 +217,11 @@ class Trajectory:
         with reading(self.path):
             return np.diag(self._group["box/edges/value"][frame])[: self.dimension].copy()
 
+    def tilt(self, frame=0):
+        """Where the image of the box above is along x, in a sheared box [length]."""
+        with reading(self.path):
+            return float(self._group["box/edges/value"][frame][1, 0])
+
     def _read(self, name, frame):
         with reading(self.path):
             return self._group[name]["value"][frame][:, : self.dimension]

@@ -91,7 +91,7 @@ class Panel {
     if (!camera.fitted) camera.fit(...this.content(frame), this.flat, this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight));
     Object.assign(this, { frame, shown: number });
     this.spheres.setPositions(frame.position);
-    this.spheres.setBox(frame.edges, this.state.boundary, this.flat,
+    this.spheres.setBox(frame.edges, frame.tilt, this.state.boundary, this.flat,
                         this.state.walls.filter(({ shape }) => !shape?.[0]).map((wall) => planeOf(wall, frame.time)),
                         this.state.walls.filter(({ shape }) => shape?.[0]).map(({ shape }) => shape));
     offerColours();

@@ -37,12 +37,12 @@ const source = (() => {
 })();
 
 // One frame; io/view/run_source.h describes the bytes.
-const FRAME_HEAD = 64;
+const FRAME_HEAD = 72;
 function readFrame(buffer, particles) {
-  const [time, step, collisions, x, y, z, counted, spins] = new Float64Array(buffer, 0, 8);
+  const [time, step, collisions, x, y, z, counted, spins, tilt] = new Float64Array(buffer, 0, 9);
   const floats = (first, n) => new Float32Array(buffer, FRAME_HEAD + 4 * first, n);
   return {
-    time, step, collisions, edges: [x, y, z],
+    time, step, collisions, edges: [x, y, z], tilt,
     position: floats(0, 3 * particles),
     speed: floats(3 * particles, particles),
     spin: spins ? floats(4 * particles, particles) : null,

@@ -45,16 +45,20 @@ class Spheres {
   setValues(values, range) { Object.assign(this, { values, range }); }
   // `pairs`: two ids for each bond.
   setBonds(pairs) { this.bonds = pairs; }
-  // `boundary`: wall, periodic or open, for each axis. `planes`: further walls and walls that have moved. `round`: the shapes of the
+  // `tilt`: where the image above is along x. `boundary`: wall, periodic or open, for each axis. `planes`: further walls and walls that have moved. `round`: the shapes of the
   // others, drawn as circles and lines.
-  setBox(edges, boundary, flat, planes = [], round = []) {
+  setBox(edges, tilt, boundary, flat, planes = [], round = []) {
     const corner = (bits) => edges.map((edge, k) => (bits & (1 << k) ? edge : 0)), ends = [], dimension = flat ? 2 : 3;
     for (let bits = 0; bits < 1 << dimension; bits++)
       for (let k = 0; k < dimension; k++) if (!(bits & (1 << k))) ends.push(...corner(bits), ...corner(bits | (1 << k)));
+    if (tilt) {  // where the boxes above and below begin
+      const [x, y, z] = edges, part = 0.08 * y;
+      for (const at of flat ? [0] : [0, z]) ends.push(tilt, y, at, tilt, y + part, at, x - tilt, 0, at, x - tilt, -part, at);
+    }
     for (const shape of round) ends.push(...outlineOf(shape, edges, flat).flat());
     if (flat) for (let k = 2; k < ends.length; k += 3) ends[k] = 0;
     this.lines("box", ends);
-    Object.assign(this, { edges, boundary, flat, walls: [...wallsOf(edges, boundary, flat), ...planes.map((plane) => partOf(plane, edges, flat))] });
+    Object.assign(this, { edges, tilt, boundary, flat, walls: [...wallsOf(edges, boundary, flat), ...planes.map((plane) => partOf(plane, edges, flat))] });
   }
   // `ends`: the two ends of each line, three coordinates each.
   lines(name, ends) {
@@ -124,14 +128,16 @@ class Spheres {
   }
   // A bond across a periodic boundary is drawn as two halves, each towards the nearest image of the other end.
   drawBonds() {
-    const { gl, bonds, positions, edges, plane, radii } = this, { seen } = this.visible, numbers = [];
+    const { gl, bonds, positions, edges, tilt, plane, radii } = this, { seen } = this.visible, numbers = [];
     const gone = (i) => plane[0] * positions[3 * i] + plane[1] * positions[3 * i + 1] + plane[2] * positions[3 * i + 2] > plane[3];
     for (let k = 0; k < bonds.length; k += 2) {
       const i = bonds[k], j = bonds[k + 1];
       if ((seen && !seen[i] && !seen[j]) || gone(i) || gone(j)) continue;
       const a = [0, 1, 2].map((axis) => positions[3 * i + axis]), b = [0, 1, 2].map((axis) => positions[3 * j + axis]);
       const thickness = 0.3 * Math.min(radii[i], radii[j]) * Math.min(1, this.size);
-      const image = edges.map((edge, axis) => (this.boundary[axis] === "periodic" ? edge * Math.round((b[axis] - a[axis]) / edge) : 0));
+      const boxes = (axis, d) => (this.boundary[axis] === "periodic" ? Math.round(d / edges[axis]) : 0);
+      const above = boxes(1, b[1] - a[1]), image = edges.map((edge, axis) => edge * boxes(axis, b[axis] - a[axis] - (axis ? 0 : above * tilt)));
+      image[0] += above * tilt;
       if (!image.some((shift) => shift)) { numbers.push(...a, ...b, thickness); continue; }
       const half = [0, 1, 2].map((axis) => (b[axis] - image[axis] - a[axis]) / 2);
       if (Math.hypot(...half) < 1.3 * this.size * Math.max(radii[i], radii[j])) continue;  // it would barely leave the sphere
