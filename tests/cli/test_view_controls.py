@@ -26,7 +26,7 @@ def test_bonds_and_walls_are_drawn(browser, tmp_path):
         assert "walls along x, y" in label(browser)
         # Periodic boundaries have no wall, and a bond across one is drawn as two halves.
         browser.execute_script("""const { spheres } = panels[0];
-            spheres.setBox(spheres.edges, ["periodic", "periodic"], true);
+            spheres.setBox(spheres.edges, 0, ["periodic", "periodic"], true);
             spheres.setPositions(Float32Array.of(1, 2.5, 0, 7.8, 2.5, 0, 5.5, 2.5, 0, 7.5, 1, 0));
             spheres.setBonds(Uint32Array.of(0, 1));
             dirty = true;""")
@@ -35,6 +35,16 @@ def test_bonds_and_walls_are_drawn(browser, tmp_path):
         assert pixel(browser, pixels, 0.3, 2.5).min() > 100 and pixel(browser, pixels, 8.6, 2.5).min() > 100
         assert abs(pixel(browser, pixels, 4, 2.5) - BACKGROUND).max() < 3
         assert all(abs(pixel(browser, pixels, x, 5.09) - BACKGROUND).max() < 3 for x in np.linspace(1, 8, 20))
+        # In a sheared box the image above is displaced, and lines above and below show where images begin.
+        assert browser.execute_script("return panels[0].spheres.corners.box") == 8
+        browser.execute_script("""const { spheres } = panels[0];
+            spheres.setBox(spheres.edges, 2, ["periodic", "periodic"], true);
+            spheres.setPositions(Float32Array.of(1, 0.4, 0, 3, spheres.edges[1] - 1.4, 0, 5.5, 2.5, 0, 7.5, 1, 0));
+            dirty = true;""")
+        pixels = picture(browser)
+        height = browser.execute_script("return panels[0].spheres.edges[1]")
+        assert browser.execute_script("return panels[0].spheres.corners.box") == 12
+        assert pixel(browser, pixels, 3, height - 0.65).min() > 100 and abs(pixel(browser, pixels, 1, height - 0.65) - BACKGROUND).max() < 3
 
 
 def brightest(browser, pixels, x, y):
@@ -53,7 +63,7 @@ def test_round_walls_are_drawn(browser, tmp_path):
         # In three dimensions a sphere has three circles, and a cylinder along z five and eight lines.
         ends = browser.execute_script("""return [[0, 0, 0], [0, 0, 1]].map((along) => {
             const { spheres } = panels[0];
-            spheres.setBox([4, 4, 4], ["wall", "wall", "wall"], false, [], [[2, 2, 2, 2, ...along, 1]]);
+            spheres.setBox([4, 4, 4], 0, ["wall", "wall", "wall"], false, [], [[2, 2, 2, 2, ...along, 1]]);
             return spheres.corners.box;
         })""")
         assert ends == [24 + 3 * 96 * 2, 24 + 5 * 96 * 2 + 8 * 2]
