@@ -73,7 +73,8 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     system.fields.add_working(
         this,
         [this] {
-          for (auto* each : {&a_, &mean_, &move_, &smooth_, &flown_, &w_, &v_end_}) std::vector<Vec<D>>().swap(*each);
+          for (auto* each : {&a_, &mean_, &move_, &smooth_, &flown_, &w_, &lab_, &v_end_})
+            std::vector<Vec<D>>().swap(*each);
           forces_ = {};
         },
         [this, &p] {
@@ -231,11 +232,14 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       hold(system, h, true);
       a_ = mean_;
     }
-    lab_ = p.v;
-    from_flow_ = {};
-    if (system.box.shear_rate != 0) from_flow_.join(system, p.x, lab_, 1);
+    const bool flows = system.box.shear_rate != 0;
+    if (flows) {
+      lab_ = p.v;
+      from_start_ = {};
+      from_start_.join(system, p.x, lab_, 1);
+    }
     system.box.next_tilt = system.box.tilt + system.box.slide() * h;
-    core_->begin(lab_, a_, h, resolved);
+    core_->begin(flows ? lab_ : p.v, a_, h, resolved);
     std::ranges::fill(swaps_, 0);
     std::ranges::fill(move_, Vec<D>::Zero());
     any_freezes_ = false;
@@ -385,8 +389,12 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     const auto& p = system.particles;
     const auto &x = core_->x(), &v = core_->v();
     for (Id i = 0; i < p.size(); ++i) v_end_[i] = v[i] + h * (mean_[i] - a_[i]);
-    FlowEnergy<D> from_flow = from_flow_;
-    if (system.box.shear_rate != 0) from_flow.join(system, x, v_end_, -1);
+    if (system.box.shear_rate != 0) {
+      FlowEnergy<D> flow = from_start_;
+      flow.join(system, x, v_end_, -1);
+      from_flow_ = system.decomposition.sum(flow).booked;
+      from_flow_.add((system.box.next_tilt - system.box.tilt) * system.decomposition.sum(forces_.by_tilt()).value());
+    }
     ExactSeries missing_here, kinetic;
     double pressing = 0;  // Σ |F| |x| of reactions
     double stopped = 0;   // energy that held contacts have dissipated
@@ -416,11 +424,6 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
       kinetic.add(0.5 * moving_mass(p.mass[i]) * (v_end_[i] - centre()).squaredNorm());
     }
     const Sums sums = system.decomposition.sum(Sums{missing_here.sum(), kinetic.sum()});
-    if (system.box.shear_rate != 0) {
-      from_flow.booked = system.decomposition.sum(from_flow).booked;
-      from_flow.booked.add((system.box.next_tilt - system.box.tilt) *
-                           system.decomposition.sum(PotentialSums{.by_tilt = forces_.by_tilt()}).by_tilt.value());
-    }
     const double missing = sums.missing.value(), most = kMostFolded * sums.kinetic.value();
     const bool folds_all = std::abs(missing + owed_) <= most, folds = folds_all || std::abs(missing) <= most;
     const double r = folds_all ? missing + owed_ : missing, share = r / sums.kinetic.value();
@@ -430,8 +433,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     balance_ = {.owed = dissipates ? 0 : left,
                 .dissipated = dissipates ? left + stopped : 0,
                 .folded = folds ? std::abs(r) : 0,
-                .stretch = folds && r != 0 ? share / (1 + std::sqrt(1 + share)) : 0,
-                .shear = from_flow.booked};
+                .stretch = folds && r != 0 ? share / (1 + std::sqrt(1 + share)) : 0};
     if (any_freezes_)
       balance_.frozen =
           static_cast<std::uint64_t>(sum_over_all<D>(system, [&](Id i) { return frozen(i) ? 1.0 : 0.0; }));
@@ -453,7 +455,7 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
     owed_ = balance_.owed;
     if (balance_.dissipated != 0) counters_->dissipated.add(balance_.dissipated);
     counters_->folded += balance_.folded;
-    if (system.box.shear_rate != 0) counters_->shear.add(balance_.shear);
+    if (system.box.shear_rate != 0) counters_->shear.add(from_flow_);
     counters_->frozen += balance_.frozen;
     system.decomposition.update_halo();
     past_.pass(h, resting() ? smooth_ : mean_);
@@ -473,12 +475,12 @@ class EventDrivenDiscreteGradient : public Integrator<D> {
   std::vector<Vec<D>> a_, mean_;   // accelerations of the flight, and those that result from it
   std::vector<Vec<D>> smooth_;     // mean_ without reactions, if contacts rest
   std::vector<Vec<D>> flown_, w_;  // mean velocities of particles in contacts at rest
-  std::vector<Vec<D>> lab_;        // velocities in the laboratory at the start of a piece
-  FlowEnergy<D> from_flow_;        // as far as it depends on the start of the piece
+  std::vector<Vec<D>> lab_;        // velocities in the laboratory at the start of a piece, in a sheared box
+  FlowEnergy<D> from_start_;       // the part of the energy that the flow gives in the piece that its start determines
+  ExactSum from_flow_;             // all of this energy
   std::vector<Vec<D>> v_end_;      // relative to the flow
   struct Balance {
     double owed = 0, dissipated = 0, folded = 0, stretch = 0;
-    ExactSum shear;  // energy that the flow gave
     std::uint64_t frozen = 0;
   } balance_;                         // of the last piece that was solved
   double owed_ = 0;                   // missing energy that is carried over

@@ -111,13 +111,14 @@ class FreeFlight : public Integrator<D> {
     system.wrap();
   }
 
-  /// join_flow(), which books the energy that the flow gave in flight.
+  /// Changes velocities from one frame to the other (FlowEnergy), and books the energy that the flow gave in flight.
   void join(const System<D>& system, Particles<D>& particles, double sign, Counters& counters) {
     if (system.box.shear_rate == 0) return;
     FlowEnergy<D> energy;
     energy.join(system, particles.x, particles.v, sign);
-    counters.shear.add(system.decomposition.sum(energy).booked);
-    start_again_ = system.decomposition.sum(energy).undone;
+    const FlowEnergy<D> of_all = system.decomposition.sum(energy);
+    counters.shear.add(of_all.booked);
+    start_again_ = of_all.undone;
   }
 
   std::uint64_t max_events_;

@@ -50,9 +50,9 @@ std::string IntegratorInfo::refusal_of_shear(const System<D>& system, bool fixed
   if (fixed)
     return "fixed particles do not move with the flow of 'shear'; let all particles move, or leave 'shear' out";
   if (stepping && !box.contacts.elastic())
-    return "'shear' goes with [[contact]] in free-flight only; take this method, or leave one of them out";
+    return "'shear' goes with [[contact]] in free-flight only; take free-flight, or leave one of them out";
   if (stepping && std::ranges::any_of(box.options, [](const auto& wall) { return wall.temperature > 0; }))
-    return "'shear' goes with thermal walls in free-flight only; take this method, or leave one of them out";
+    return "'shear' goes with thermal walls in free-flight only; take free-flight, or leave one of them out";
   if (stepping && std::ranges::any_of(system.interactions, [](const auto& term) { return !term->knows_shear(); }))
     return "'shear' goes with bonds and with pair forces whose cutoff is shorter than each periodic edge, not with "
            "fields, Ewald sums or forces without a cutoff; give a cutoff, or leave one of them out";

@@ -5,8 +5,8 @@
 //   state         JSON: what the run is, how many frames there are, whether it is active
 //   particles     32-bit floats, little-endian: N radii [length], N species, N masses [mass], N charges [charge]
 //   bonds         32-bit integers: the two ids of each bond, which count from 0
-//   frame/K       eight doubles (time, step, collisions, the three edges of the box, whether counts and whether spins
-//                 follow), then floats: N positions of three columns [length], N speeds [velocity], N magnitudes of the
+//   frame/K       nine doubles (time, step, collisions, the three edges of the box, whether counts and whether spins
+//                 follow, the tilt of the box [length]), then floats: N positions of three columns [length], N speeds [velocity], N magnitudes of the
 //                 spins [1/time], N numbers of collisions so far
 //   path/I/K      floats: the positions of particle I from frame K on, at most 2000 frames
 //   thermo/B      thermo.csv from its byte B on, complete rows, at most 4 MiB
