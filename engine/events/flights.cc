@@ -304,9 +304,7 @@ template <int D>
 Contact<D> Flights<D>::contact_of(const EventKey<D>& key, const Record<D>& a, const Record<D>& b,
                                   const Offset<D>& offset, const EventResult<D>& result) const {
   const auto& [d, impulse, exchange, overlap, sigma] = result;
-  Vec<D> shift = offset.start;
-  shift[0] += offset.slide * key.time;
-  const Vec<D> v_a = a.v - flow(a), v_b = b.v - flow(b);
+  const Vec<D> shift = offset.at(key.time), v_a = a.v - flow(a), v_b = b.v - flow(b);
   if (a.id < b.id) return {key, a.x, b.x - shift, impulse, exchange, overlap, sigma, v_a, v_b};
   return {key, b.x, a.x + shift, -impulse, exchange, overlap, sigma, v_b, v_a};
 }

@@ -67,6 +67,13 @@ template <int D>
 struct Offset {
   Vec<D> start = Vec<D>::Zero();  ///< [length]
   double slide = 0;               ///< along the first axis; it is not zero under shear only [length/time]
+
+  /// The displacement at a time after the start of the slab.
+  Vec<D> at(double elapsed) const {
+    Vec<D> displaced = start;
+    displaced[0] += slide * elapsed;
+    return displaced;
+  }
 };
 
 template <int D>
@@ -242,12 +249,7 @@ struct Box {
     if (tilt != 0 && image[1] != 0) s[0] += image[1] * tilt;
     return s;
   }
-  /// The displacement of an image at a time after `time`; and at the time of `next_tilt`.
-  Vec<D> shift_after(const Image<D>& image, double elapsed) const {
-    Vec<D> s = shift(image);
-    if (shear_rate != 0 && image[1] != 0) s[0] += image[1] * slide() * elapsed;
-    return s;
-  }
+  /// The displacement of an image at the time of `next_tilt`.
   Vec<D> next_shift(const Image<D>& image) const {
     Vec<D> s = shift(image);
     if (sheared() && image[1] != 0) s[0] = image[0] * edges[0] + image[1] * next_tilt;

@@ -308,11 +308,11 @@ void SlabCore<D>::predict_all(Id i) {
 template <int D>
 void SlabCore<D>::predict_pair(Id i, Id j, const Image<D>& image) {
   const double t = std::max(start(i), start(j)), sigma = scan_->contact_distance(i, j), time_left = length_ - t;
-  const Vec<D> d = position(i, t) - position(j, t) + box_.shift_after(image, t);
+  const Offset<D> offset = box_.offset(image);
+  const Vec<D> d = position(i, t) - position(j, t) + offset.at(t);
   const Vec<D> v_i = velocity(i, t), v_j = velocity(j, t);
   Vec<D> v = v_i - v_j;
-  if (box_.sheared()) [[unlikely]]
-    v[0] += box_.offset(image).slide;
+  v[0] += offset.slide;
   const PairSteps* const steps = has_steps_ ? scan_->steps(i, j) : nullptr;
   const bool touching = scan_->touches(d, sigma);
   const double slack =
@@ -384,10 +384,10 @@ struct SlabCore<D>::Meeting {
       sigma = core.particles_.radius[key.lo];
       return;
     }
-    normal =
-        core.position(key.lo, key.time) - core.position(key.hi, key.time) + core.box_.shift_after(key.image, key.time);
+    const Offset<D> offset = core.box_.offset(key.image);
+    normal = core.position(key.lo, key.time) - core.position(key.hi, key.time) + offset.at(key.time);
     v_hi = core.velocity(key.hi, key.time);
-    v_hi[0] -= core.box_.offset(key.image).slide;
+    v_hi[0] -= offset.slide;
     speed = normal.dot(v_lo - v_hi) / normal.norm();
     sigma = core.scan_->contact_distance(key.lo, key.hi);
     hard.distance = sigma;
@@ -519,10 +519,10 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     contact.x_hi = wall.foot(lo.x, key.time);
   } else {
     Flight& hi = flights_[slot_[key.hi] - 1];
-    const Vec<D> shift = box_.shift_after(key.image, key.time), d = lo.x - hi.x + shift;
-    const double slide = box_.offset(key.image).slide;
+    const Offset<D> offset = box_.offset(key.image);
+    const Vec<D> shift = offset.at(key.time), d = lo.x - hi.x + shift;
     Vec<D> v = lo.v - hi.v;
-    v[0] += slide;
+    v[0] += offset.slide;
     contact.x_hi = hi.x - shift;
     const StepSurface* const step = has_steps_ ? step_of(key) : nullptr;
     if (step ? step->tether() && !(d.dot(v) > 0) : !(d.dot(v) < 0)) return;
@@ -534,7 +534,7 @@ void SlabCore<D>::collide(const EventKey<D>& key) {
     contact.exchange = {.virial = (contact.x_lo - contact.x_hi).dot(impulse.factor * d),
                         .dissipated = impulse.dissipated,
                         .stored = impulse.stored,
-                        .shear = -slide * contact.impulse[0],
+                        .shear = -offset.slide * contact.impulse[0],
                         .event = impulse.event};
     contact.v_hi = hi.v;
     contact.v_hi[0] -= box_.flow(hi.x);
