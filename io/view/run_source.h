@@ -6,8 +6,8 @@
 //   particles     32-bit floats, little-endian: N radii [length], N species, N masses [mass], N charges [charge]
 //   bonds         32-bit integers: the two ids of each bond, which count from 0
 //   frame/K       nine doubles (time, step, collisions, the three edges of the box, whether counts and whether spins
-//                 follow, the tilt of the box [length]), then floats: N positions of three columns [length], N speeds [velocity], N magnitudes of the
-//                 spins [1/time], N numbers of collisions so far
+//                 follow, the tilt of the box [length]), then floats: N positions of three columns [length], N speeds
+//                 [velocity], N magnitudes of the spins [1/time], N numbers of collisions so far
 //   path/I/K      floats: the positions of particle I from frame K on, at most 2000 frames
 //   thermo/B      thermo.csv from its byte B on, complete rows, at most 4 MiB
 //   rdf, sk, profile   rdf.csv, sk.csv, profile.csv
