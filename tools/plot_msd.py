@@ -40,15 +40,20 @@ def regular_frames(times):
     return odd[0] + 1 if len(odd) else len(times)
 
 
+def sheared(trajectory):
+    """Whether a flow carries the particles along x: only the displacements across it diffuse."""
+    return any(trajectory.tilt(frame) != 0 for frame in range(len(trajectory)))
+
+
 def mean_squared_displacement(trajectory):
     """Lag times up to half the length of the trajectory, how many windows of each follow one another, the mean squared
-    displacement [lags], and that of the origins in each of so many parts of the run [parts, lags]."""
+    displacement [lags], in a sheared box across the flow, and that of the origins in each of so many parts of the run [parts, lags]."""
     frames = regular_frames(trajectory.time)
     if frames < 3:
         raise SystemExit("There are not enough frames at equal times: set output.frame_interval to a multiple of the step.")
     if frames < len(trajectory) - 1:
         print(f"Using the first {frames} of {len(trajectory)} frames: the others don't come at equal times.")
-    x = np.stack([trajectory.unwrapped(frame) for frame in range(frames)])
+    x = np.stack([trajectory.unwrapped(frame) for frame in range(frames)])[:, :, int(sheared(trajectory)):]
     # Up to 100 lags, at equal distances or, for long trajectories, at equal ratios.
     lags = np.unique(np.geomspace(1, frames // 2, 100).astype(int)) if frames > 200 else np.arange(1, frames // 2 + 1)
     of_origins = [np.mean(np.sum((x[lag:] - x[:-lag]) ** 2, axis=2), axis=1) for lag in lags]
@@ -92,7 +97,8 @@ def particle_numbers(directory):
         return {}
     with Trajectory(directory) as trajectory:
         numbers = np.bincount(trajectory.species, minlength=len(trajectory.species_names))
-        return {"msd": len(trajectory.species)} | {f"msd_{name}": n for name, n in zip(trajectory.species_names, numbers)}
+        return {msd + name: n for msd in ("msd", "msd_across")
+                for name, n in [("", len(trajectory.species)), *zip([f"_{name}" for name in trajectory.species_names], numbers)]}
 
 
 @one_line
@@ -110,7 +116,7 @@ def main(arguments=None):
         columns, _ = split_errors(read_table(options.run))
         with reading(options.run):
             lag, windows = columns.pop("time"), columns.pop("origins")
-        dimension, file, title, table = options.dimension, options.output or options.run.with_suffix(".png"), "", None
+        dimension, file, title, table = options.dimension - ("msd_across" in columns), options.output or options.run.with_suffix(".png"), "", None
         numbers = particle_numbers(options.run.parent)
         spread = {name: relative_errors(windows, numbers.get(name, np.nan), dimension) for name in columns}
         error = {}
@@ -121,10 +127,11 @@ def main(arguments=None):
     else:
         with Trajectory(options.run) as trajectory:
             lag, windows, msd, of_blocks = mean_squared_displacement(trajectory)
-            dimension, title = trajectory.dimension, trajectory.title
-        columns = {"msd": msd}
-        spread = {"msd": relative_errors(windows, len(trajectory.species), dimension)}
-        error = {"msd": error_of_blocks(lag, windows, of_blocks, dimension, between)}
+            across = sheared(trajectory)
+            dimension, title, name = trajectory.dimension - across, trajectory.title, "msd_across" if across else "msd"
+        columns = {name: msd}
+        spread = {name: relative_errors(windows, len(trajectory.species), dimension)}
+        error = {name: error_of_blocks(lag, windows, of_blocks, dimension, between)}
         file = options.output or (options.run if options.run.is_dir() else options.run.parent) / "msd.png"
         table = file.with_name(file.stem + "-frames.csv")
         np.savetxt(table, np.stack([lag, msd], axis=1), delimiter=",", header="lag,msd", comments="")

@@ -223,9 +223,11 @@ def random_deck(dice, seconds):
     system = {"dimension": dimension, "boundary": boundary}
     forces = random_forces(dice, method, dimension, boundary, [each["name"] for each in particles])
     if method in ("free-flight", "psa", "verlet", "edda") and boundary[:2] == ["periodic", "periodic"] and dice.random() < 0.5:
-        system["shear"] = {"rate": dice.choice([-1, 1]) * 10**dice.uniform(-1.5, 0.5)}
+        rate = lambda: dice.choice([-1, 1]) * 10**dice.uniform(-1.5, 0.5)
+        unit = end * 1e-3 if method == "free-flight" else step
+        changes = sorted({unit * dice.randrange(1 + int(end / unit)) for _ in range(dice.choice([0, 0, 1, 2, 3]))})
+        system["shear"] = {"rate": [[time, dice.choice([0.0, rate()])] for time in changes] or rate()}
         steps = []
-        output.pop("msd_interval", None)
         if method != "free-flight":
             contacts = []
             walls = [wall for wall in walls if "temperature" not in wall]
@@ -242,7 +244,7 @@ def words(deck):
     n = sum(species["count"] for species in deck["particles"])
     forces = "+".join(term["type"] for term in deck["interaction"]) or "no forces"
     more = "".join(f", {kind}" for kind in ("wall", "contact", "step", "bath") if deck.get(kind))
-    more += ", shear" if "shear" in deck["system"] else ""
+    more += ", shear" * ("shear" in deck["system"]) + " that changes" * isinstance(deck["system"].get("shear", {}).get("rate"), list)
     more += ", spins" if any("tangential" in law for law in deck.get("contact", [])) else ""
     return f"{deck['integrator']['type']} {deck['system']['dimension']}-D {n} {forces} {'/'.join(deck['system']['boundary'])}{more}"
 

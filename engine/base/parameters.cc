@@ -33,7 +33,9 @@ void check(std::string_view of, const Parameter& parameter, const ParameterValue
   const bool either =
       (parameter.type == Parameter::Type::real_or_table && (plain || std::holds_alternative<TableValue>(value))) ||
       (parameter.type == Parameter::Type::real_or_list &&
-       (plain || std::holds_alternative<std::vector<double>>(value)));
+       (plain || std::holds_alternative<std::vector<double>>(value))) ||
+      (parameter.type == Parameter::Type::real_or_pairs &&
+       (plain || std::holds_alternative<std::vector<std::vector<double>>>(value)));
   if (value.index() != type && !either)
     refuse(of, quoted(parameter.name) + " is " + kTypes[value.index()],
            std::string("give ") + (type < kTypes.size()                              ? kTypes[type]

@@ -35,6 +35,7 @@ struct Parameter {
     table,          ///< an inline table: `keys`
     real_or_list,   ///< a number, or a list of numbers
     real_or_table,  ///< a number, or an inline table: `keys`
+    real_or_pairs,  ///< in an inline table: a number, or pairs of numbers
   };
   enum class Range { any, positive, non_negative };
 
@@ -47,7 +48,7 @@ struct Parameter {
   std::vector<std::string> choices{};  ///< for text: the allowed values; empty = any
   std::vector<std::array<std::string, 2>> former{};       ///< for text: former values, each with what to write instead
   double most = std::numeric_limits<double>::infinity();  ///< for numbers: the largest allowed value
-  std::vector<Parameter> keys{};                          ///< a table has these keys: numbers and texts, all required
+  std::vector<Parameter> keys{};  ///< a table has these keys: numbers, texts and pairs, all required
 
   bool required() const { return fallback.empty(); }
   bool has_default() const { return !required() && fallback != "none"; }
@@ -57,7 +58,7 @@ struct Parameter {
 using PairList = std::vector<std::array<std::uint32_t, 2>>;
 
 /// An inline table.
-using TableValue = std::map<std::string, std::variant<double, std::string>>;
+using TableValue = std::map<std::string, std::variant<double, std::string, std::vector<std::vector<double>>>>;
 
 using ParameterValue = std::variant<bool, std::int64_t, double, std::vector<double>, std::string,
                                     std::vector<std::string>, PairList, std::vector<std::vector<double>>, TableValue>;

@@ -43,7 +43,7 @@ struct FlowEnergy {
 };
 
 /// The flow in a step of a method with kicks: velocities become those in the laboratory until leave(). Does nothing
-/// where there is no flow.
+/// in a box that is not sheared.
 template <int D>
 class FlowOfStep {
  public:
@@ -55,10 +55,12 @@ class FlowOfStep {
   /// the trapezoidal rule.
   void leave(double length, Accelerations<D>& at_end, Counters& counters) {
     auto& p = system_.particles;
-    if (system_.box.shear_rate == 0) return system_.wrap();
-    energy_.join(system_, p.x, p.v, -1);
-    counters.shear.add(system_.decomposition.sum(energy_).booked);
-    counters.shear.add(0.5 * length * system_.box.slide() * (by_tilt_ + at_end.by_tilt));
+    if (!system_.box.sheared()) return system_.wrap();
+    if (system_.box.shear_rate != 0) {
+      energy_.join(system_, p.x, p.v, -1);
+      counters.shear.add(system_.decomposition.sum(energy_).booked);
+      counters.shear.add(0.5 * length * system_.box.slide() * (by_tilt_ + at_end.by_tilt));
+    }
     const std::vector<Image<D>> before = p.image;
     system_.wrap();
     // The images of all partners of a particle that is wrapped along y change by as many boxes.

@@ -113,6 +113,7 @@ class FreeFlight : public Integrator<D> {
 
   /// Changes velocities from one frame to the other (FlowEnergy), and books the energy that the flow gave in flight.
   void join(const System<D>& system, Particles<D>& particles, double sign, Counters& counters) {
+    start_again_ = {};
     if (system.box.shear_rate == 0) return;
     FlowEnergy<D> energy;
     energy.join(system, particles.x, particles.v, sign);

@@ -169,9 +169,27 @@ void Box<D>::set_motion(const WallOptions<D>& its, Wall<D>& wall) const {
 template <int D>
 void Box<D>::restart() {
   for (WallOptions<D>& each : options) each.restart(time);
+  for (auto& each : shear_rates) each[0] -= time;
   bath.ramp_start -= time;
   bath.ramp_end -= time;
   begin_step(0, 0);
+}
+
+template <int D>
+double Box<D>::strain(double begin, double end) const {
+  double sum = 0, path = 0, from = begin, rate = shear_rates.empty() ? shear_rate : 0;
+  const auto flow_until = [&](double to) {
+    sum += rate * (to - from);
+    path += std::abs(rate) * (to - from);
+    from = to;
+  };
+  for (const auto& [change, next] : shear_rates) {
+    if (change >= end) break;
+    if (change > begin) flow_until(change);
+    rate = next;
+  }
+  flow_until(end);
+  return path > 0 && std::abs(sum) == path ? sum : std::numeric_limits<double>::quiet_NaN();
 }
 
 template <int D>

@@ -88,12 +88,30 @@ struct Box {
   ContactLaws contacts{};
   Steps steps{};
   double shear_rate = 0;  ///< of Lees–Edwards boundaries: dv_x/dy of the flow; the images above slide along x [1/time]
-  double tilt = 0;        ///< where the image above is along x at `time`; between slabs in [0, edges[0]) [length]
-  double next_tilt = 0;   ///< at the end of the piece over which mean forces are computed [length]
+  /// For a flow that changes: times, each with the rate from then on; before the first time it rests. Then
+  /// `shear_rate` is the present one. Empty: `shear_rate` is constant.
+  std::vector<std::array<double, 2>> shear_rates{};
+  double tilt = 0;         ///< where the image above is along x at `time`; between slabs in [0, edges[0]) [length]
+  double next_tilt = 0;    ///< at the end of the piece over which mean forces are computed [length]
   std::int32_t turns = 0;  ///< the number of edges that shorten_tilt() has taken off; only its changes have a meaning
 
   /// Whether the lattice of images is not that of the edges alone: it slides, or stays tilted after a flow.
-  bool sheared() const { return shear_rate != 0 || tilt != 0; }
+  bool sheared() const { return shear_rate != 0 || tilt != 0 || !shear_rates.empty(); }
+  /// The rate of shear at a time.
+  double shear_rate_at(double at) const {
+    double rate = shear_rates.empty() ? shear_rate : 0;
+    for (const auto& [from, next] : shear_rates)
+      if (reached(from, at)) rate = next;
+    return rate;
+  }
+  /// The largest rate of shear of all times, without its sign.
+  double fastest_shear() const {
+    double fastest = std::abs(shear_rate);
+    for (const auto& each : shear_rates) fastest = std::max(fastest, std::abs(each[1]));
+    return fastest;
+  }
+  /// The strain between two times; NaN if the flow rests or turns.
+  double strain(double begin, double end) const;
   /// The velocity of the flow along x at a position. Positions along y are unwrapped.
   double flow(const Vec<D>& x) const { return shear_rate * x[1]; }
   /// How fast the image above slides [length/time].
@@ -193,17 +211,23 @@ struct Box {
   void begin_step(double start, double length) {
     time = step_start = start;
     step = length;
+    shear_rate = shear_rate_at(start);
   }
-  /// When the motion of a wall ends that still moves at this time; infinite if none does.
+  /// When the motion of a wall ends that still moves at this time, or the rate of shear changes; infinite if neither
+  /// does.
   double next_end(double at) const {
     double next = std::numeric_limits<double>::infinity();
     for (const WallOptions<D>& each : options)
       if (each.moves() && !each.rests(at)) next = std::min(next, each.until);
+    for (const auto& each : shear_rates)
+      if (!reached(each[0], at)) next = std::min(next, each[0]);
     return next;
   }
   /// The longest step that the walls allow; infinite if none is shaken [time].
   double longest_step() const;
-  /// Makes the present time the time 0 of a new run; walls and ramps go on.
+  /// Whether a change of the rate of shear is past, but for the rounding of times in a run.
+  bool reached(double change, double at) const { return at >= change * (1 - 1e-12) - 1e-9 * step; }
+  /// Makes the present time the time 0 of a new run; walls, ramps and changes of the flow go on.
   void restart();
   /// Throws Error(failure) if two parallel walls leave no room between them, or a step is too long for a shaken wall.
   void check(Failure failure) const;

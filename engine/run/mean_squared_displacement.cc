@@ -18,6 +18,8 @@ template <int D>
 void MeanSquaredDisplacement<D>::add_sample(double time, const Particles<D>& particles) {
   now_.resize(particles.size());
   for (std::size_t i = 0; i < particles.size(); ++i) now_[i] = particles.x[i] + system_.box.shift(particles.image[i]);
+  if (system_.box.sheared())
+    for (Vec<D>& x : now_) x[0] = 0;  // the flow carries particles along x
   const std::uint64_t index = this->samples();
   if (index == 0) {
     species_ = particles.species;
@@ -93,11 +95,12 @@ std::vector<TableColumn> MeanSquaredDisplacement<D>::table() const {
     table[0].values.push_back(row.time);
     table[1].values.push_back(static_cast<double>(row.origins));
   }
+  const std::string name = system_.box.sheared() ? "msd_across" : "msd";
   add(
-      "msd", [](const Row& row) { return row.msd; }, [](const Row& row) { return row.error; });
+      name, [](const Row& row) { return row.msd; }, [](const Row& row) { return row.error; });
   for (std::size_t s = 0; number_.size() > 1 && s < number_.size(); ++s)
     add(
-        "msd_" + system_.species[s], [s](const Row& row) { return row.of[s]; },
+        name + "_" + system_.species[s], [s](const Row& row) { return row.of[s]; },
         [s](const Row& row) { return row.errors[s]; });
   return table;
 }
@@ -118,10 +121,13 @@ ObservableInfo msd() {
           "The mean squared displacement of all particles and, if there are several species, of each of them; it is "
           "continuous across periodic boundaries. Columns: time (the lag), origins (the number of time origins), "
           "msd, msd_A, and error_ and samples_ of each, from the means over particles of each origin. A drift of the "
-          "whole system is not subtracted.",
+          "whole system is not subtracted. In a sheared box the columns are msd_across and msd_across_A, and "
+          "displacements "
+          "are those across the flow, along y and z.",
       .source = "Frenkel, Smit, Understanding Molecular Simulation, 2nd ed., section 4.4.2",
       .in_2d = maker<MeanSquaredDisplacement, 2>(),
-      .in_3d = maker<MeanSquaredDisplacement, 3>()};
+      .in_3d = maker<MeanSquaredDisplacement, 3>(),
+      .sheared = true};
 }
 
 }  // namespace observable

@@ -12,7 +12,8 @@
 // (samples/10^(decade+1)) origins and all particles, a sample costs 10/9 passes over the particles, and one position
 // per particle and decade is stored. (A thinned form of the order-n algorithm of Frenkel, Smit, Understanding Molecular
 // Simulation, 2nd ed., section 4.4.2.) Displacements are continuous across periodic boundaries; a drift of the whole
-// system is not subtracted. Sums are exact, so that their order does not matter.
+// system is not subtracted. In a sheared box they are those across the flow. Sums are exact, so that their order does
+// not matter.
 
 #include <cstdint>
 #include <vector>

@@ -60,7 +60,7 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
       frames_(plan.frame_interval),
       rows_(plan.thermo_interval),
       tail_(tail_of(system)) {
-  statistics.shear_rate = system.box.shear_rate;
+  statistics.shear_rate = system.box.shear_rates.empty() ? system.box.shear_rate : 0;
   statistics.tail_energy = tail_.energy;
   statistics.tail_pressure = pressure_of(tail_.virial, system.box, system.box.time);
   if (system.keeps_momentum()) statistics.max_momentum_error = 0;
@@ -258,8 +258,7 @@ void Monitor<D>::settle() {
 /// Begins the means over time at the present time.
 template <int D>
 void Monitor<D>::begin_means() {
-  statistics_.series =
-      Blocking(Statistics::mean_names.size() + column_of_wall_.size() + (system_.box.sheared() ? 1 : 0));
+  statistics_.series = Blocking(Statistics::mean_names.size() + column_of_wall_.size() + (has_mean_stress() ? 1 : 0));
 }
 
 /// Adds a slab to the means. `path`: the mean length of the spheres' ways in it.
@@ -292,8 +291,10 @@ void Monitor<D>::add_to_series(const Waiting& slab, double path) {
   for (std::size_t wall = 0; wall < std::min(column_of_wall_.size(), tally.walls.size()); ++wall)
     values_[Statistics::mean_names.size() + column_of_wall_[wall]] +=
         since(tally.walls[wall].impulse, sampled_walls_[wall]);
-  if (const double work = system_.box.sheared() ? since(tally.shear, account_.sampled_shear) : 0; system_.box.sheared())
+  if (has_mean_stress()) {
+    const double work = since(tally.shear, account_.sampled_shear);
     values_.back() = system_.box.plain() ? stress_of(work, system_.box) : none;
+  }
   statistics_.series.add(values_, weights_);
 }
 
@@ -405,7 +406,8 @@ void Monitor<D>::show(Snapshot<D> shot, bool last) {
   shot.pressure = pressure_of(account_.virial + collisions, system_.box, shot.time);
   const double work = statistics_.counters.shear.value();
   if (system_.box.sheared() && account_.last_row >= 0 && shot.time > account_.last_row)
-    shot.shear_stress = stress_of(work - account_.last_row_shear, system_.box) / (shot.time - account_.last_row);
+    shot.shear_stress =
+        (work - account_.last_row_shear) / (system_.box.strain(account_.last_row, shot.time) * system_.box.volume());
   shot.max_energy_error = statistics_.max_energy_error;
   // Only whole intervals count: the first row has had no collisions, the last one may be early.
   if (row && waits() && !transient_end_ && rows_.due() <= now && shot.time > statistics_.start_time)

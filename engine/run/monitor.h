@@ -122,6 +122,8 @@ class Monitor {
   }
   /// Whether the method has a shadow energy, which is known for boxes without shear.
   bool has_shadow() const { return info_.shadow && !system_.box.sheared(); }
+  /// Whether the statistics have the mean of the shear stress: a flow that changes has none.
+  bool has_mean_stress() const { return system_.box.sheared() && system_.box.shear_rates.empty(); }
   void settle();
   void take(const Waiting& slab, const Sums& sums);
   void show(Snapshot<D> shot, bool last);

@@ -274,6 +274,9 @@ void Simulation<D>::run(const Hooks& hooks) {
   Statistics& s = statistics_;
   begin(hooks);
   set_ramp();
+  if (info_.stepping && !clock_.adapts())
+    if (const std::string no = shear_problem(*system_, plan_.end_time, plan_.step, clock_.count.time); !no.empty())
+      throw Error(Failure::deck, no);
   SlabWatch watch(system_->fields, first_of_integrator_, hooks.leave, hooks.leave_here, info_.adapts);
   const double seconds_before = s.wall_seconds;
   const auto take_time = [&] {
@@ -340,13 +343,13 @@ void Simulation<D>::run(const Hooks& hooks) {
   take_time();
 }
 
-/// The next slab of the clock; where its length is free, it ends no later than the motion of a wall, and before the
-/// strain of a sheared box is too large for its lists.
+/// The next slab of the clock; where its length is free, it ends no later than the motion of a wall and the next change
+/// of a flow, and before the strain of a sheared box is too large for its lists.
 template <int D>
 Slab Simulation<D>::next_slab() const {
   Slab slab = clock_.next_slab(statistics_);
   double left = system_->box.next_end(slab.start) - slab.start;
-  if (system_->box.sheared()) left = std::min(left, longest_slab(*system_));
+  if (system_->box.sheared()) left = std::min(left, longest_slab(*system_, slab.start));
   if ((!info_.stepping || clock_.adapts()) && left < slab.length) {
     slab.length = left;
     slab.ends_step = false;

@@ -108,7 +108,9 @@ struct StepReadings {
 
 /// The numbers of a Snapshot that runs in a sheared box have in addition.
 struct ShearReadings {
-  double shear_stress = 0;  ///< −P_xy since the last thermo row, from the work of the flow [energy/length^D]
+  /// −P_xy since the last thermo row, from the work of the flow; NaN in a sheared box whose flow rests or turns, 0 in
+  /// others [energy/length^D].
+  double shear_stress = 0;
 };
 
 /// What an observer gets: a state and its observables, all at `time`.
@@ -203,7 +205,7 @@ struct Statistics {
   static constexpr std::array mean_names = {"pressure",       "temperature",    "potential",
                                             "collision_rate", "mean_free_time", "mean_free_path"};
   Blocking series;
-  double shear_rate = 0;       ///< of the box [1/time]
+  double shear_rate = 0;       ///< of the box, if it is constant [1/time]
   double wall_seconds = 0;     ///< spent in the loop of run()
   bool stopped_early = false;  ///< should_stop has ended it
 

@@ -30,6 +30,7 @@ class Compressor {
     }
     box_.bath = {};
     box_.shear_rate = box_.tilt = 0;
+    box_.shear_rates.clear();
     const std::size_t n = radius.size();
     particles_.x.resize(n);
     particles_.v.assign(n, Vec<D>::Zero());

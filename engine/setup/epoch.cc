@@ -81,24 +81,39 @@ double contact_rate(const System<D>& system) {
   return gas_of(system).contacts_a_time;
 }
 
+namespace {
 template <int D>
-double longest_slab(const System<D>& system) {
+double strain_of_slab(const System<D>& system) {
   // The images of a row of boxes slide by half of the strain before and after the middle of the slab.
   const Box<D>& box = system.box;
   const double boxes = Packing<D>(1, system.size()).largest() - 2;
-  return std::min(kStrainOfSlab, 2 * boxes * box.edges[0] / box.edges[1]) / std::abs(box.shear_rate);
+  return std::min(kStrainOfSlab, 2 * boxes * box.edges[0] / box.edges[1]);
+}
+}  // namespace
+
+template <int D>
+double longest_slab(const System<D>& system, double start) {
+  return strain_of_slab(system) / std::abs(system.box.shear_rate_at(start));
 }
 
 template <int D>
-std::string shear_problem(const System<D>& system, std::optional<double> end_time) {
+std::string shear_problem(const System<D>& system, std::optional<double> end_time, double step, double start) {
   const Box<D>& box = system.box;
   if (!box.sheared()) return "";
   if (Packing<D>(1, system.size()).largest() < 3)
     return "'shear' is for fewer particles, because the numbers of images have few bits beside so many; take fewer";
-  if (!std::isfinite(box.slide() * box.slide()) || (end_time && *end_time > kMostSlabs * longest_slab(system)))
-    return "the rate of 'shear', " + short_text(box.shear_rate) + ", is so large that the run would have more than " +
+  const double fastest = box.fastest_shear(), slide = fastest * box.edges[1];
+  if (!std::isfinite(slide * slide) || (end_time && *end_time > kMostSlabs * strain_of_slab(system) / fastest))
+    return "the rate of 'shear', " + short_text(fastest) + ", is so large that the run would have more than " +
            short_text(kMostSlabs) + " epochs, one for a strain of " + short_text(kStrainOfSlab) +
            "; give a smaller rate, or end the run earlier";
+  for (const auto& each : box.shear_rates) {
+    const double after = each[0] - start, steps = std::round(after / step);
+    if (step > 0 && after > 0 && std::abs(after - steps * step) > 1e-9 * step + 1e-12 * each[0])
+      return "the rate of 'shear' changes at the time " + short_text(each[0], 15) +
+             ", within a step of this method; give a time at which a step of " + short_text(step, 15) +
+             " starts, such as " + short_text(start + steps * step, 15);
+  }
   return "";
 }
 
@@ -110,7 +125,7 @@ double default_epoch(const System<D>& system) {
   const double farthest = kFarthestInBoxes * system.box.edges.maxCoeff();
   double epoch = std::min(kEventsOfEpoch / rate, farthest / std::max(thermal_speed, light_speed));
   // The flow makes neighbours meet about once in a strain, also if they are cold.
-  if (system.box.shear_rate != 0) epoch = std::min(epoch, kEventsOfEpoch / std::abs(system.box.shear_rate));
+  epoch = std::min(epoch, kEventsOfEpoch / system.box.fastest_shear());
   if (bath.acts_at_ends()) epoch = std::min(epoch, kEpochOfRelaxation / bath.relaxation_rate());
   // The images of the fastest particles, also in equilibrium, must fit into a candidate on any number of ranks.
   const double speed = std::max(fastest, 5 * light_speed);
@@ -167,10 +182,10 @@ double next_epoch(const System<D>& system, const PastEpoch& past) {
   return longest;
 }
 
-template double longest_slab(const System<2>&);
-template double longest_slab(const System<3>&);
-template std::string shear_problem(const System<2>&, std::optional<double>);
-template std::string shear_problem(const System<3>&, std::optional<double>);
+template double longest_slab(const System<2>&, double);
+template double longest_slab(const System<3>&, double);
+template std::string shear_problem(const System<2>&, std::optional<double>, double, double);
+template std::string shear_problem(const System<3>&, std::optional<double>, double, double);
 template double contact_rate(const System<2>&);
 template double contact_rate(const System<3>&);
 template double default_epoch(const System<2>&);

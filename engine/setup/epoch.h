@@ -15,14 +15,15 @@ namespace carom {
 /// inputs/sheared-fluid.toml, restitution 0.9 and rate 1, strains of 0.25, 0.5 and 1 gave 170, 191 and 179 thousand
 /// collisions a second, and elastic spheres at rate 0.1 251, 240 and 246 thousand.
 inline constexpr double kStrainOfSlab = 0.5;
-/// The longest slab of a sheared box, shorter for a box that is so high that its images slide far; infinite if the
-/// images do not slide.
+/// The longest slab of a sheared box from this time on, shorter for a box that is so high that its images slide far;
+/// infinite if the images do not slide then.
 template <int D>
-double longest_slab(const System<D>& system);
+double longest_slab(const System<D>& system, double start);
 
-/// Why this system cannot be sheared at this rate, as "what is wrong; what to do"; empty if it can.
+/// Why this system cannot be sheared at this rate, as "what is wrong; what to do"; empty if it can. `step`: of a method
+/// with fixed steps, the first of which starts at `start`; 0: of others.
 template <int D>
-std::string shear_problem(const System<D>& system, std::optional<double> end_time);
+std::string shear_problem(const System<D>& system, std::optional<double> end_time, double step = 0, double start = 0);
 
 /// The contacts of a sphere with others in a unit of time in equilibrium at this density and temperature, that of the
 /// bath if it is higher (Enskog's theory); 0 if nothing moves. Collective; the particles must be in blocks of ids.

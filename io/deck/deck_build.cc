@@ -178,6 +178,8 @@ void fill_box(const Deck::Source& source, System<D>& system) {
   std::copy_n(source.boundary.begin(), D, system.box.boundary.begin());
   if (!source.edges.empty()) std::copy_n(source.edges.begin(), D, system.box.edges.begin());
   system.box.shear_rate = source.shear_rate;
+  system.box.shear_rates = source.shear_rates;
+  system.box.begin_step(0, 0);
   system.box.tilt = source.tilt;
   for (const ValueTable& wall : source.values.list("wall"))
     if (!wall.wrong) add_wall(system.box, wall.values, source.placement.seed);
@@ -270,8 +272,11 @@ std::unique_ptr<System<D>> build_system(Deck& deck, Communicator* ranks, const G
   const bool fixed = std::ranges::any_of(source.species, &SpeciesConfig::fixed);
   if (const std::string no = source.integrator->refusal_of_shear(*system, fixed); !no.empty())
     problems.error(source.shear, no);
-  else if (const std::string too_fast = shear_problem(*system, deck.plan.end_time); !too_fast.empty())
-    problems.error(source.shear, too_fast);
+  else if (const std::string other =
+               shear_problem(*system, deck.plan.end_time,
+                             source.integrator->stepping && !given && deck.plan.accuracy == 0 ? deck.plan.step : 0);
+           !other.empty())
+    problems.error(source.shear, other);
   problems.throw_errors(Failure::deck);
   if (given && !given->branch) return system;
   complete_values(deck, *system, given, problems);

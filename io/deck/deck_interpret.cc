@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <ranges>
 
 #include "engine/laws/bath_options.h"
 #include "engine/laws/contact_options.h"
@@ -75,7 +76,19 @@ class Interpreter {
       for (const std::string& name : *boundary) source_.boundary.push_back(find_boundary(name).boundary);
     }
     source_.shear = table->place("shear");
-    if (const auto* shear = table->find<TableValue>("shear")) source_.shear_rate = std::get<double>(shear->at("rate"));
+    if (const auto* shear = table->find<TableValue>("shear")) {
+      const auto& rate = shear->at("rate");
+      if (const auto* constant = std::get_if<double>(&rate)) source_.shear_rate = *constant;
+      if (const auto* pairs = std::get_if<std::vector<std::vector<double>>>(&rate)) {
+        for (const std::vector<double>& pair : *pairs)
+          if (pair.size() == 2) source_.shear_rates.push_back({pair[0], pair[1]});
+        const auto times = source_.shear_rates | std::views::keys;
+        if (pairs->empty() || times.size() != pairs->size() || !(times.front() >= 0) ||
+            !std::ranges::is_sorted(times, std::less_equal()))
+          problems_.error(source_.shear, "'rate' is no list of pairs with increasing times, the first at least 0",
+                          "give a number, or [[time, rate], …]");
+      }
+    }
     if (table->read<double>("tilt", source_.tilt); table->given("tilt")) {
       if (!table->given("shear")) source_.shear = table->place("tilt");
       if (!(source_.tilt >= 0) || (!source_.edges.empty() && !(source_.tilt < source_.edges[0])))

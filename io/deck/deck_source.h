@@ -51,6 +51,7 @@ struct Deck::Source {
   std::vector<double> edges;  ///< empty: the packing fraction sets them
   std::vector<Boundary> boundary;
   double shear_rate = 0, tilt = 0;
+  std::vector<std::array<double, 2>> shear_rates;
   std::vector<SpeciesConfig> species;
   PlacementConfig placement;
   std::vector<InteractionConfig> interactions;

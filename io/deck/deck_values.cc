@@ -145,6 +145,9 @@ class NodeReader {
         return read_list<PairList::value_type>(node, [this](const toml::node& n) { return read_pair(n); });
       case vector_list:
         return read_list<std::vector<double>>(node, [&](const toml::node& n) { return read_list<double>(n, as_real); });
+      case real_or_pairs:
+        if (!node.is_array()) return read_real(node);
+        return read_list<std::vector<double>>(node, [&](const toml::node& n) { return read_list<double>(n, as_real); });
       case table:
         return read_inline(node, "a table");
       case real_or_table:
@@ -250,6 +253,8 @@ class NodeReader {
       else if (auto value = NodeReader(key, deck_, problems_).read(*item)) {
         if (const auto* number = std::get_if<double>(&*value)) values.emplace(key.name, *number);
         if (const auto* text = std::get_if<std::string>(&*value)) values.emplace(key.name, *text);
+        if (const auto* pairs = std::get_if<std::vector<std::vector<double>>>(&*value))
+          values.emplace(key.name, *pairs);
       }
     }
     for (const auto& [name, item] : *table)

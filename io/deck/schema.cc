@@ -123,7 +123,9 @@ std::vector<TableSchema> make_schema() {
          {},
          {},
          std::numeric_limits<double>::infinity(),
-         {{"rate", real, "", "1/time", "the velocity of the flow at y is rate·y"}}},
+         {{"rate", real_or_pairs, "", "1/time",
+           "the velocity of the flow at y is rate·y; or [[time, rate], …], each rate from its time on, in the order of "
+           "the times: a flow that begins, ends or turns"}}},
         {"tilt", real, "none", "length",
          "where the image of the box above is along x at the start, between 0 and the edge along x: a flow before this "
          "run has moved it there"}}},
@@ -276,6 +278,8 @@ std::string type_name(const Parameter& key) {
       return "list of vectors";
     case real_or_list:
       return range + "number, or a list of numbers";
+    case real_or_pairs:
+      return range + "number, or a list of pairs of numbers";
     case table:
     case real_or_table: {
       std::string names;

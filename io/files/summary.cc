@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "io/deck/deck_source.h"
 #include "io/files/rank_account.h"
 #include "io/files/version.h"
 
@@ -89,7 +90,9 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
          s.steps > s.start_steps ? (s.end_time - s.start_time) / static_cast<double>(s.steps - s.start_steps) : 0.0},
         {"longest", s.longest_step},
         {"local_error", s.local_error}};
-  if (s.shear_rate != 0) {
+  if (const auto& rates = deck.source->shear_rates; !rates.empty()) {
+    json["shear"] = {{"rates", rates}, {"work", c.shear.value()}};
+  } else if (s.shear_rate != 0) {
     const Estimate stress = s.shear_stress();
     Estimate viscosity = stress;
     viscosity.mean /= s.shear_rate;

@@ -62,7 +62,7 @@ const std::vector<Column<D>>& columns() {
       {"bonds", number, "-", "pairs inside the outermost of their steps, for each particle",  //
        [](S s, int) { return s.bonds; }, nullptr, "bonds"},
       {"shear_stress", number, "energy/length^D",
-       "−P_xy since the last row, from the work of the flow; 0 without shear",  //
+       "−P_xy since the last row, from the work of the flow; nan while a flow rests or turns, 0 without shear",  //
        [](S s, int) { return s.shear_stress; }, "shear_stress", "shear_stress"}};
   return all;
 }

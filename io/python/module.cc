@@ -134,6 +134,7 @@ void bind(py::module_& module, const char* name) {
       .def("set", [](S& session, const std::string& table,
                      const py::dict& given) { session.set(table, parameters_of(table_schema(table), given)); })
       .def("set_shear", &S::set_shear)
+      .def_property_readonly("shear_rate", &S::shear_rate)
       .def("set_bath_temperature", &S::set_bath_temperature)
       .def("take", &S::take)
       .def("run",

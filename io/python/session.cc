@@ -85,7 +85,7 @@ Session<D>::Session(Deck& deck, const std::optional<GivenState>& given, const Pa
   for (const char* const table : {"particles", "placement", "run", "output"}) values_.list(table).clear();
   for (std::size_t n = 0; n < system_->interactions.size(); ++n)
     set_bonds(values_.list("interaction")[n].values, *system_->interactions[n]);
-  note_tilt();
+  note_shear();
   species_ = system_->species;
   size_ = system_->size();
   text_ = deck.toml_text;
@@ -318,27 +318,45 @@ void Session<D>::set_wall(Parameters given) {
 }
 
 template <int D>
-void Session<D>::set_shear(double rate, std::optional<double> new_tilt) {
-  if (!std::isfinite(rate)) refuse("the rate of shear is not finite; give a number");
+void Session<D>::set_shear(std::optional<std::vector<std::array<double, 2>>> rates, std::optional<double> new_tilt) {
+  double before = -1;
+  for (const auto& [time, rate] : rates.value_or(std::vector<std::array<double, 2>>{})) {
+    if (!std::isfinite(rate)) refuse("the rate of shear is not finite; give a number");
+    if (!(time >= 0 && time > before))
+      refuse("the times of the rates of shear do not increase; give [[time, rate], …], the first time at least 0");
+    before = time;
+  }
+  if (rates && rates->empty()) refuse("there is no rate of shear; give a number");
   const double tilt = new_tilt.value_or(box_.tilt);
   if (!(tilt >= 0 && tilt < box_.edges[0]))
     refuse("the tilt is not between 0 and the edge along x; add or take off edges");
   change("set the shear");
-  box_.shear_rate = rate;
+  if (rates) {
+    const bool constant = rates->size() == 1 && rates->front()[0] == 0;
+    box_.shear_rate = rates->front()[1];
+    box_.shear_rates = constant ? std::vector<std::array<double, 2>>{} : *rates;
+    box_.begin_step(0, 0);
+  }
   box_.tilt = tilt;
   system_->box = box_;
-  note_tilt();
-  Parameters& of_system = values_.find("system")->values;
-  of_system.erase("shear");
-  if (rate != 0) of_system.set("shear", TableValue{{"rate", rate}});
+  note_shear();
 }
 
-/// Writes the present tilt into the values, from which decks are made.
+/// Writes the present and future rates of shear and the present tilt into the values, from which decks are made.
 template <int D>
-void Session<D>::note_tilt() {
+void Session<D>::note_shear() {
   Parameters& of_system = values_.find("system")->values;
-  of_system.erase("tilt");
+  for (const char* const key : {"shear", "tilt"}) of_system.erase(key);
   if (box_.tilt != 0) of_system.set("tilt", box_.tilt);
+  std::vector<std::vector<double>> rates;
+  for (const auto& [from, rate] : box_.shear_rates) {
+    if (box_.reached(from, box_.time)) rates.clear();
+    rates.push_back({std::max(0.0, from - box_.time), rate});
+  }
+  if (!rates.empty())
+    of_system.set("shear", TableValue{{"rate", rates}});
+  else if (box_.shear_rate != 0)
+    of_system.set("shear", TableValue{{"rate", box_.shear_rate}});
 }
 
 template <int D>
@@ -556,7 +574,8 @@ void Session<D>::rest(Particles<D>& particles) {
   for (auto* each : {&particles.x, &particles.v}) each->resize(size_, Vec<D>::Zero());  // if free flight has failed
   box_.time = statistics_.end_time;
   box_.tilt = at_work_->box.tilt;
-  note_tilt();
+  box_.shear_rate = box_.shear_rate_at(box_.time);
+  note_shear();
   box_.bath = at_work_->box.bath;  // with the times of its ramp
   system_ = std::make_unique<System<D>>();
   system_->box = box_;

@@ -90,8 +90,11 @@ class Session : Observer<D> {
   /// By species; 0 or missing: homogeneous.
   const std::vector<double>& inertias() const { return box_.contacts.inertias; }
   const std::vector<std::string>& species() const { return species_; }
-  /// Shears the box with a rate, and sets the tilt if it is given; a rate of 0 ends the flow.
-  void set_shear(double rate, std::optional<double> tilt);
+  /// Shears the box with these rates from these times on (Box::shear_rates), counted from the present, and sets the
+  /// tilt; what is not given stays. A rate of 0 ends the flow.
+  void set_shear(std::optional<std::vector<std::array<double, 2>>> rates, std::optional<double> tilt);
+  /// The rate of shear at the present time, also during a run [1/time].
+  double shear_rate() const { return (at_work_ ? at_work_->box : box_).shear_rate; }
   /// The tilt of the lattice of images (Box), also during a run [length].
   double tilt() const { return (at_work_ ? at_work_->box : box_).tilt; }
   std::size_t size() const { return size_; }
@@ -120,7 +123,7 @@ class Session : Observer<D> {
   double present() const { return showing_ ? shot_->time : statistics().end_time; }
   void set_wall(Parameters given);
   void add_contact(Parameters given);
-  void note_tilt();
+  void note_shear();
   void add_step(Parameters given);
   void set_pair_steps(std::vector<ValueTable> all);
   void add_force(Parameters given);

@@ -14,9 +14,11 @@ import pytest
 
 from going_on import go_on
 from runs import CAROM, ROOT, needs_carom, run, signalled, summary, thermo, write_deck
+from test_ranks import expect_same_anywhere
 
 sys.path.insert(0, str(ROOT / "tools"))
-from carom_files import toml_text
+import plot_msd
+from carom_files import Trajectory, toml_text
 
 pytestmark = needs_carom
 
@@ -144,6 +146,21 @@ def test_trajectories_have_the_tilt_of_the_box(tmp_path):
     assert np.abs(moved).max() < 0.3 * 6 and np.abs(images[-1, :, 0]).max() > 5    # 6: faster than all
 
 
+def test_displacements_are_those_across_the_flow(tmp_path):
+    """msd.csv against a sum over frames, and the same diffusion coefficient from both."""
+    output = ran(tmp_path, FLUID, ["run.end_time=40", "output.frame_interval=0.5", "output.msd_interval=0.5"])
+    columns = np.genfromtxt(output / "msd.csv", delimiter=",", names=True)
+    assert columns.dtype.names == ("time", "origins", "msd_across", "error_msd_across", "samples_msd_across")
+    with Trajectory(output) as trajectory:
+        x = np.stack([trajectory.unwrapped(frame) for frame in range(len(trajectory))])[:, :, 1:]
+        lag = 5  # the origins of the first decade are ten samples apart
+        assert columns["msd_across"][lag - 1] == pytest.approx(np.mean([np.sum((x[k + lag] - x[k])**2, 1) for k in range(0, 76, 10)]), rel=1e-12)
+        lags, windows, msd, _ = plot_msd.mean_squared_displacement(trajectory)
+    one = plot_msd.diffusion_coefficient(lags, windows, msd, 2, (4, 20))
+    other = plot_msd.diffusion_coefficient(columns["time"], columns["origins"], columns["msd_across"], 2, (4, 20))
+    assert one == pytest.approx(other, rel=0.1) and 0.1 < one < 1
+
+
 def test_converted_frames_are_of_a_tilted_box(tmp_path):
     ase_io, gsd_hoomd = pytest.importorskip("ase.io"), pytest.importorskip("gsd.hoomd")
     output = ran(tmp_path, FLUID, ["run.end_time=0.7", "output.frame_interval=0.7"])
@@ -164,6 +181,43 @@ def test_converted_frames_are_of_a_tilted_box(tmp_path):
     assert again.get_all_distances(mic=True)[np.triu_indices(500, 1)].min() == pytest.approx(nearest, abs=1e-5)
     tilt = [line.split() for line in (tmp_path / "frame.data").read_text().splitlines() if line.endswith("xy xz yz")]
     assert [float(number) for number in tilt[0][:3]] == pytest.approx([-3.0, 0.0, 0.0])
+
+
+CHANGES = FLUID | {"system": FLUID["system"] | {"shear": {"rate": [[1.3, 1.0], [3.6, -0.5], [4.0, 0.0], [5.2, 2.0]]}}, "contact": [],
+                   "run": {"end_time": 6.0}, "output": FLUID["output"] | {"thermo_interval": 0.4, "frame_interval": 0.4}}
+
+
+def strain_of(time):
+    """The strain since the start at the rates of CHANGES."""
+    ends = np.array([1.3, 3.6, 4.0, 5.2, np.inf])
+    return sum(rate * np.clip(time - begin, 0, end - begin) for rate, begin, end in zip((1.0, -0.5, 0.0, 2.0), ends, ends[1:]))
+
+
+def test_a_flow_that_begins_turns_and_ends(killer, tmp_path):
+    output = ran(tmp_path, CHANGES)
+    rows, found = thermo(output), summary(output)
+    time, work = rows["time"], rows["work"]
+    edge = 1000 ** (1 / 3)
+    assert found["shear"] == {"rates": CHANGES["system"]["shear"]["rate"], "work": work[-1]}
+    assert found["energy"]["max_abs_error"] < 1e-12 * found["energy"]["reference"] and found["max_overlap"] < 1e-11
+    rests = (time < 1.3) | ((time > 4.0) & (time < 5.2))
+    flows = (time > 1.3) & (time < 3.61) | (time > 5.5)
+    before = np.flatnonzero(rests)[0:4]
+    assert np.abs(rows["temperature"][before] / rows["temperature"][0] - 1).max() < 1e-13 and (work[before] == 0).all()
+    assert np.isnan(rows["shear_stress"][rests][1:]).all()
+    assert np.diff(work)[flows[1:]] == pytest.approx(rows["shear_stress"][flows] * np.diff(strain_of(time))[flows[1:]] * 1000, rel=1e-11)
+    with Trajectory(output) as trajectory:
+        slides = strain_of(trajectory.time) * edge - [trajectory.tilt(frame) for frame in range(len(trajectory))]
+    assert np.abs(slides / edge - np.round(slides / edge)).max() < 1e-12
+    settings = ["output.checkpoint_wall=\"0\""]
+    run(deck := write_deck(tmp_path, toml_text(CHANGES)), tmp_path / "whole", settings)
+    expect_same_anywhere(deck, settings, tmp_path / "whole", killer, (2, 3))
+
+
+def test_one_rate_from_the_start_is_a_constant_rate(tmp_path):
+    listed = FLUID | {"system": FLUID["system"] | {"shear": {"rate": [[0.0, 1.0]]}}}
+    outputs = [ran(tmp_path, deck, ["run.end_time=3"], name) for deck, name in ((FLUID, "number"), (listed, "listed"))]
+    assert filecmp.cmp(outputs[0] / "thermo.csv", outputs[1] / "thermo.csv", shallow=False)
 
 
 def test_a_killed_run_goes_on(killer, tmp_path):
@@ -216,13 +270,17 @@ BAD = {
                               "give a smaller rate"),
     "fast and cold": ({"system": FLUID["system"] | {"shear": {"rate": 1e300}}, "particles": [FLUID["particles"][0] | {"temperature": 0.0}]},
                       "products with it would be infinite"),
+    "no order": ({"system": FLUID["system"] | {"shear": {"rate": [[1.0, 1.0], [1.0, 0.0]]}}}, "no list of pairs with increasing times"),
+    "no pairs": ({"system": FLUID["system"] | {"shear": {"rate": [[1.0], [2.0]]}}}, "no list of pairs with increasing times"),
+    "no times": ({"system": FLUID["system"] | {"shear": {"rate": [1.0, 2.0]}}}, "'rate' has the wrong type"),
+    "thrice": ({"system": FLUID["system"] | {"shear": {"rate": [[1.0, 1.0], [2.0, math.nan]]}}}, "'rate' must be finite"),
     "no rate": ({"system": FLUID["system"] | {"shear": {}}}, "'rate'"),
     "tilt": ({"system": FLUID["system"] | {"box": [12.0, 12.0, 12.0], "tilt": 12.0}, "placement": {"type": "random", "seed": 1}},
              "'tilt' is not between 0 and the edge along x"),
     "tilt without free flight": ({"system": {"dimension": 3, "boundary": ["periodic"] * 3, "tilt": 1.0},
                                   "integrator": {"type": "cva", "step": 0.01}}, "'cva' knows no shear yet"),
     "waves": ({"output": FLUID["output"] | {"sk_interval": 1.0}}, "sk does not go with 'shear' yet"),
-    "displacements": ({"output": FLUID["output"] | {"msd_interval": 1.0}}, "msd does not go with 'shear' yet")}
+    "transport": ({"output": FLUID["output"] | {"transport_interval": 1.0}, "contact": []}, "transport does not go with 'shear' yet")}
 
 
 @pytest.mark.parametrize("name", BAD)

@@ -105,7 +105,24 @@ def test_a_rate_of_zero_is_no_shear(tmp_path):
         assert filecmp.cmp(one / "thermo.csv", other / "thermo.csv", shallow=False)
 
 
-@pytest.mark.parametrize("deck", [YUKAWA, BONDED, SOFT, YUKAWA | {"integrator": {"type": "psa", "step": 0.005}}])
+CHANGES = [[0.2, 2.0], [0.6, -1.0], [0.8, 0.0]]
+
+
+@pytest.mark.parametrize("deck", [YUKAWA, SOFT])
+def test_a_flow_that_begins_turns_and_ends(deck, tmp_path):
+    """The ledger of edda closes over changes of the rate, at fixed steps and at steps of its own; that of verlet has its error."""
+    changing = deck | {"system": deck["system"] | {"shear": {"rate": CHANGES}}}
+    edda = deck["integrator"]["type"] == "edda"
+    for k, integrator in enumerate([deck["integrator"], {"type": "edda"}] if edda else [deck["integrator"]]):
+        output = ran(tmp_path, changing | {"integrator": integrator}, ["run.end_time=1", "output.thermo_interval=0.1"], f"out{k}")
+        rows, found = thermo(output), summary(output)["energy"]
+        assert found["max_abs_error"] < (1e-12 if edda else 1e-3) * found["reference"]
+        assert (rows["work"][:3] == 0).all() and np.ptp(rows["work"][8:]) == 0 and np.ptp(rows["work"]) > 10
+        assert np.isnan(rows["shear_stress"][[1, 2, 9, 10]]).all() and np.isfinite(rows["shear_stress"][3:9]).all()
+
+
+@pytest.mark.parametrize("deck", [YUKAWA, BONDED, SOFT, YUKAWA | {"integrator": {"type": "psa", "step": 0.005}},
+                                  YUKAWA | {"system": YUKAWA["system"] | {"shear": {"rate": CHANGES}}}])
 def test_forces_in_shear_on_ranks_at_all_vector_widths_and_after_a_kill(deck, killer, tmp_path):
     plain = tmp_path / "plain"
     output = ["output.checkpoint_wall=\"0\"", "output.rdf_interval=0.25", "output.pressure_tensor_interval=0.25", "output.sample_start=0.5", "run.end_time=1"]
@@ -118,6 +135,15 @@ BAD = {"field": ({"system": YUKAWA["system"] | {"boundary": ["periodic", "period
                   "interaction": [{"type": "uniform-field", "acceleration": [0.0, 0.0, -1.0]}]}, "not with fields"),
        "long cutoff": ({"interaction": [YUKAWA["interaction"][0] | {"cutoff": 6.2}]}, "shorter than each periodic edge"),
        "laws": ({"contact": [{"between": ["sphere", "sphere"], "restitution": 0.9}]}, "'shear' goes with [[contact]] in free-flight only"),
+       "long range": ({"interaction": [{"type": "gravity", "constant": 1.0}]}, "acts between all pairs, which a periodic box does not allow"),
+       "thermal wall": ({"system": YUKAWA["system"] | {"boundary": ["periodic", "periodic", "wall"]}, "wall": [{"name": "z+", "temperature": 1.0}]},
+                        "'shear' goes with thermal walls in free-flight only"),
+       "charges": ({"particles": [{"name": "ion", "count": 64, "radius": 0.4, "temperature": 1.0, "charge": 1.0},
+                                  {"name": "other", "count": 64, "radius": 0.4, "temperature": 1.0, "charge": -1.0}],
+                    "interaction": [{"type": "coulomb", "constant": 1.0, "form": "ewald", "accuracy": 1e-3}]}, "not with fields, Ewald sums"),
+       "mcva": ({"integrator": {"type": "mcva", "step": 0.01}}, "'mcva' knows no shear yet"),
+       "within a step": ({"system": YUKAWA["system"] | {"shear": {"rate": [[0.5, 1.0], [0.755, 2.0]]}}, "integrator": {"type": "edda", "step": 0.01}},
+                         "changes at the time 0.755, within a step of this method; give a time at which a step of 0.01 starts, such as 0.76"),
        "cva": ({"integrator": {"type": "cva", "step": 0.01}}, "'cva' knows no shear yet")}
 
 

@@ -40,6 +40,29 @@ def test_a_flow_begins_and_ends():
         sim.tilt = -1
 
 
+def test_a_flow_that_changes_during_runs(tmp_path):
+    sim = fluid([[0.5, 1.0], [1.5, 0.0], [4.0, -2.0]])
+    edge = sim.box[0]
+    sim.write_deck(tmp_path / "start.toml", time=2.0)
+    assert "rate = [[0.5, 1.0], [1.5, 0.0], [4.0, -2.0]]" in (tmp_path / "start.toml").read_text() and sim.shear_rate == 0
+    sim.run(time=1.0)
+    assert sim.shear_rate == 1 and sim.tilt == pytest.approx(edge / 2, rel=1e-12)
+    sim.write_deck(tmp_path / "later.toml", time=2.0)
+    assert "rate = [[0.0, 1.0], [0.5, 0.0], [3.0, -2.0]]" in (tmp_path / "later.toml").read_text()
+    assert carom.Simulation.from_deck(tmp_path / "later.toml").shear_rate == 1
+    sim.run(time=2.0)
+    assert sim.shear_rate == 0 and min(sim.tilt, edge - sim.tilt) < 1e-12 and sim.energy_error < 1e-12
+    sim.integrator("free-flight", step=0.7)  # a new run, whose time begins at 0
+    sim.run(time=2.25)
+    assert sim.shear_rate == -2 and sim.tilt == pytest.approx(edge / 2, rel=1e-12) and sim.energy_error < 1e-12
+    sim.shear_rate = 0.5
+    sim.write_deck(tmp_path / "constant.toml", time=2.0)
+    assert "shear = { rate = 0.5 }" in (tmp_path / "constant.toml").read_text()
+    for wrong in ([[1.0, 1.0], [0.5, 2.0]], [], [[0.0, np.nan]]):
+        with pytest.raises(carom.UsageError, match="shear"):
+            sim.shear_rate = wrong
+
+
 def test_files_of_a_box_that_was_sheared_before(tmp_path):
     """A run from a tilted lattice writes a deck and files that have the tilt, and goes on."""
     sim = fluid(0.7)

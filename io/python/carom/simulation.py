@@ -504,11 +504,11 @@ class Simulation:
     species = property(lambda self: self._session.constant("species"), doc="Indices into species_names, (N,); a view.")
     species_names = property(lambda self: self._session.species, doc="The names of the species.")
     box = property(lambda self: self._table("system").get("box", [1.0] * self._table("system")["dimension"]), doc="Edges of the box [length].")
-    shear_rate = property(lambda self: self._table("system").get("shear", {"rate": 0.0})["rate"],
-                          lambda self, rate: self._session.set_shear(float(rate), None),
-                          doc="The rate of Lees-Edwards boundaries: the velocity of the flow along x, divided by y [1/time]. Set it between two "
-                              "runs; 0 ends the flow.")
-    tilt = property(lambda self: self._session.tilt, lambda self, tilt: self._session.set_shear(self.shear_rate, float(tilt)),
+    shear_rate = property(lambda self: self._session.shear_rate,
+                          lambda self, rate: self._session.set_shear([(0.0, rate)] if np.ndim(rate) == 0 else rate, None),
+                          doc="The present rate of Lees-Edwards boundaries: the velocity of the flow along x, divided by y [1/time]. Set it "
+                              "between two runs; 0 ends the flow. A list of [time, rate] changes it in the runs that follow, at times from now.")
+    tilt = property(lambda self: self._session.tilt, lambda self, tilt: self._session.set_shear(None, float(tilt)),
                     doc="Where the image of the box above is along x, between 0 and the edge [length]. A flow changes it.")
     steps = property(lambda self: self._session.tables("step"), doc="The steps of pairs, as dictionaries of their options.")
     contacts = property(lambda self: self._session.tables("contact"), doc="The laws of contacts, as dictionaries of their options.")
