@@ -41,7 +41,7 @@ class EventQueue {
 
   /// Plans a contact of a sphere if it is earlier than the planned one; `partner` as in NextEvent.
   void offer(Slot i, double time, EventKind kind, std::uint32_t partner);
-  /// Plans a contact that is known to be the earliest; for at most two spheres before each read_versions().
+  /// Plans a contact that is known to be the earliest; at most four times before each read_versions().
   void plan_pair(Slot i, double time, std::uint32_t partner) {
     NextEvent<D>& a = next_events_[i];
     a.contact = time;
@@ -124,7 +124,7 @@ class EventQueue {
   Calendar calendar_;
   std::priority_queue<Tied> tied_;  // events at the same time, in the order of their keys
   double tied_time_ = 0;
-  Slot just_planned_[2]{};  // spheres planned in the last event; their partners' versions must still be read
+  Slot just_planned_[4]{};  // spheres planned in the last event; their partners' versions must still be read
   unsigned planned_ = 0;    // their number
   EventCounts counts_;
 };

@@ -10,6 +10,7 @@ namespace carom {
 template <int D>
 void EventSearch<D>::clear() {
   lists_.reset();
+  larges_.reset();
   cells_.reset();
 }
 
@@ -57,7 +58,14 @@ void EventSearch<D>::choose(double now) {
     cells_ =
         std::make_unique<LinkedCells<D>>(box_, flights_.packing(), kernels_, tuning_.cell(), extent, flights_.size());
     if (flights_.size() < extent.particles) cells_->confine(flights_.places(now));
+    if (tuning_.small() < kNever && !flights_.equal())
+      larges_ = std::make_unique<LargeSpheres<D>>(*cells_, flights_.packing(), reaches_, tuning_.small(),
+                                                  tuning_.skin(), queue_.plans());
     for (Slot i = 0; i < flights_.size(); ++i) {
+      if (larges_ && larges_->has(i)) {
+        larges_->renew(i, flights_.at(i, now).x);
+        continue;
+      }
       queue_[i].where.cell = cells_->place(flights_.at(i, now).x);
       cells_->insert(i, queue_[i].where.cell);
     }
@@ -105,15 +113,39 @@ void EventSearch<D>::foresee_in_cells(Slot i, double now) {
   ++counts_.predictions;
   NextEvent<D>& a = queue_[i];
   a.contact = kNever;
+  if (larges_ && larges_->has(i)) return foresee_large(i, now);
   const ScanResult first = cells_->scan_around(setting_, i, a.where.cell, flights_[i].t == now, found_);
   plan_found(i, first, found_);
+  if (larges_) scan(larges_->around(i, a.where.cell), flights_[i].t == now);
   if (flights_.has_lone_events()) foresee_lone_events(i);
   predict_crossing(a, i, flights_, box_, *cells_, now);
+}
+
+/// foresee_in_cells() for a sphere that is not in the cells.
+template <int D>
+void EventSearch<D>::foresee_large(Slot i, double now) {
+  scan(larges_->around(i), flights_[i].t == now);
+  if (flights_.has_lone_events()) foresee_lone_events(i);
+  predict_leaving(queue_[i], flights_[i], flights_, FlowFrame(), larges_->skin(), now);
+}
+
+/// Makes a new region for a large sphere that is about to leave the one it has.
+template <int D>
+void EventSearch<D>::renew_region(Slot i, double now) {
+  ++counts_.rebuilds;
+  larges_->renew(i, flights_.at(i, now).x);
+  scan(larges_->around(i), false);
+  predict_leaving(queue_[i], flights_[i], flights_, FlowFrame(), larges_->skin(), now);
+  queue_.schedule(i);
 }
 
 /// Both spheres are scanned before anything depends on what was found, so that the processor overlaps the scans.
 template <int D>
 void EventSearch<D>::plan_two_in_cells(Slot i, Slot j, double now) {
+  if (larges_) {
+    for (const Slot one : {i, j}) plan(one, now);
+    return;
+  }
   counts_.predictions += 2;
   NextEvent<D>&a = queue_[i], &b = queue_[j];
   const ScanResult first = cells_->scan_around(setting_, i, a.where.cell, true, found_);
@@ -213,7 +245,9 @@ double EventSearch<D>::distance_left(Slot i) const {
 
 template <int D>
 void EventSearch<D>::look_again(Slot i, double now) {
-  if (cells_)
+  if (larges_ && larges_->has(i))
+    renew_region(i, now);
+  else if (cells_)
     cross(i, now);
   else
     renew_list(i, now);
@@ -241,10 +275,12 @@ template <int D>
 void EventSearch<D>::cross(Slot i, double now) {
   ++counts_.crossings;
   NextEvent<D>& a = queue_[i];
+  const CellPlace<D> before = a.where.cell;
   cells_->cross(i, a.where.cell, a.face / 2, a.face % 2 == 1 ? 1 : -1);
   const ScanResult first = cells_->scan_ahead(setting_, i, a.where.cell, a.face, found_);
   predict_crossing(a, i, flights_, box_, *cells_, now);
   plan_found(i, first, found_);
+  if (larges_ && larges_->parts(before, a.where.cell)) scan(larges_->around(i, a.where.cell), false);
   queue_.schedule(i);
 }
 

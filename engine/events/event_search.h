@@ -12,6 +12,7 @@
 #include "engine/base/sizes.h"
 #include "engine/events/contact.h"
 #include "engine/events/event_prefetch.h"
+#include "engine/search/large_spheres.h"
 #include "engine/search/search_tuning.h"
 
 namespace carom {
@@ -56,7 +57,7 @@ class EventSearch {
 
   /// Starts to prefetch the data of the next events.
   void prefetch() {
-    if (small_) return;
+    if (small_ || larges_) return;
     if (lists_)
       prefetch_upcoming(queue_, flights_, *lists_, large_);
     else
@@ -69,6 +70,8 @@ class EventSearch {
   void choose(double now);
   void foresee(Slot i, double now);
   void foresee_in_cells(Slot i, double now);
+  void foresee_large(Slot i, double now);
+  void renew_region(Slot i, double now);
   void plan_two_in_cells(Slot i, Slot j, double now);
   [[gnu::noinline]] void foresee_lone_events(Slot i);
   void foresee_update(Slot i, double now);
@@ -113,6 +116,7 @@ class EventSearch {
 
   std::unique_ptr<SkinLists<D>> lists_;  // lists_ or cells_ is set
   std::unique_ptr<LinkedCells<D>> cells_;
+  std::unique_ptr<LargeSpheres<D>> larges_;  // if the cells hold small spheres only
   Candidates found_, others_;
   std::vector<std::uint32_t> near_;
   std::vector<double> reaches_;                // for which lists or cells were made; one value if all are equal

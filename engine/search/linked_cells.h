@@ -55,6 +55,8 @@ class LinkedCells {
   }
 
   const CellGrid<D>& grid() const { return grid_; }
+  /// The farthest box that a sphere has reached.
+  std::int32_t widest() const { return widest_; }
 
   /// The cell of a position.
   Place place(const Vec<D>& x) const {
@@ -142,10 +144,13 @@ class LinkedCells {
     }
     collect(low, high, found);
   }
-  /// Finds all spheres in the cells between two corners, as seen from the box that holds the origin.
-  void find_between(const Vec<D>& low, const Vec<D>& high, std::vector<std::uint32_t>& found) const {
+  /// Finds all spheres in the cells between two cells or positions, as seen from the box that holds the origin.
+  void find_between(const Cell<D>& low, const Cell<D>& high, std::vector<std::uint32_t>& found) const {
     found.clear();
-    collect(grid_.cell(low), grid_.cell(high), found);
+    collect(low, high, found);
+  }
+  void find_between(const Vec<D>& low, const Vec<D>& high, std::vector<std::uint32_t>& found) const {
+    find_between(grid_.cell(low), grid_.cell(high), found);
   }
 
   /// Finds all spheres in the sphere's cell and in the cells around it, and the first contact with them. `latest` as in
@@ -427,7 +432,7 @@ class LinkedCells {
   // By cell, in rows along the last axis: the first sphere with the image of its cell, and kMoreInCell; or kEmpty.
   PageVector<std::uint32_t> first_;
   PageVector<CellLink> link_;  // by slot
-  std::int32_t widest_ = 0;    // the farthest box that a sphere has reached
+  std::int32_t widest_ = 0;
 };
 
 }  // namespace carom

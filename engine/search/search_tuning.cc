@@ -120,11 +120,18 @@ void SearchTuning::choose(const SearchSituation& situation, const EventCounts& c
     before_ = counts;
   }
   // The smallest cell that cells and regions allow in any case.
-  cell_ = std::max(cell_, situation.largest);
+  cell_ = std::max(cell_, std::min(situation.largest, 2 * small_));
 }
 
 void SearchTuning::choose_first(const SearchSituation& s) {
   chosen_ = true;
+  if (options_.method == SearchOptions::Method::small_cells) {
+    lists_ = false;
+    small_ = options_.small;
+    cell_ = options_.cell;
+    skin_ = options_.skin;
+    return;
+  }
   lists_ = options_.method == SearchOptions::Method::automatic ? s.filled > dense(s.dimension) || mixed(s)
                                                                : options_.method == SearchOptions::Method::lists;
   // The approximate space that each sphere has beyond close packing.

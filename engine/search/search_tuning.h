@@ -16,10 +16,11 @@ namespace carom {
 
 /// How the core searches. No option changes a result; 0 and `automatic` leave the choice to the core.
 struct SearchOptions {
-  enum class Method : std::uint8_t { automatic, lists, cells };
+  enum class Method : std::uint8_t { automatic, lists, cells, small_cells };
   Method method = Method::automatic;
   double skin = 0;             ///< how far a sphere may move before its list is renewed [length]
   double cell = 0;             ///< smallest edge of a cell [length]
+  double small = 0;            ///< of small_cells: the largest reach of small spheres [length]
   double entries_per_bin = 0;  ///< entries per bin of the calendar
   double sort_interval = 20;   ///< contacts per particle between two sorts of the particles in space
   double in_cache = 16384;     ///< spheres that fit in a cache, an eighth in a fast one; more are prefetched (0: all)
@@ -53,6 +54,8 @@ class SearchTuning {
   bool lists() const { return lists_; }
   double skin() const { return skin_; }  ///< skin of the lists
   double cell() const { return cell_; }  ///< smallest edge of the cells
+  /// The largest reach of spheres that are in cells, if larger ones are beside them (LargeSpheres); else infinite.
+  double small() const { return small_; }
 
  private:
   void choose_first(const SearchSituation& situation);
@@ -60,7 +63,7 @@ class SearchTuning {
 
   SearchOptions options_;
   bool chosen_ = false, lists_ = true;
-  double skin_ = 0, cell_ = 0;
+  double skin_ = 0, cell_ = 0, small_ = std::numeric_limits<double>::infinity();
   // The candidates grow as this power of the reach, and renewals as this power of the skin. These are rough values for
   // a dense fluid, until a change of the skin has shown better ones. Measured were 1.9 and −2.0 at a packing fraction
   // of 0.49, 3 and −1.5 at 0.33.

@@ -130,6 +130,34 @@ TEST(Search, GrowingSpheres) {
       {.system = random_system<2>(60, {9, 9}, {W, P}, 0.2, 0.4, 13), .growth = 0.1, .slab = 0.5}, 100);
 }
 
+/// Spheres up to several sizes in cells, larger ones beside them.
+template <int D>
+void expect_the_same_beside_cells(const Case<D>& c, std::size_t at_least) {
+  const auto reference = run(c, {.method = Method::lists});
+  ASSERT_GE(reference.contacts.size(), at_least);
+  const auto& radius = c.system->particles.radius;
+  const auto [least, most] = std::ranges::minmax(radius);
+  for (const double share : {-1.0, 0.0, 0.2, 0.6, 0.95})
+    for (const double skin : {0.03, 0.3, 1.5}) {
+      const double small = least + share * (most - least);
+      const SearchOptions options{.method = Method::small_cells, .skin = skin * most, .cell = 0.5 * most, .small = small};
+      expect_same(reference, run(c, options),
+                  "up to " + std::to_string(small) + ", skin " + std::to_string(skin * most));
+    }
+}
+
+TEST(Search, LargeSpheresBesideCells) {
+  expect_the_same_beside_cells<3>({.system = random_system<3>(300, {7, 7, 7}, {P, P, P}, 0.1, 1.0, 3), .slab = 0.05},
+                                  1000);
+  expect_the_same_beside_cells<2>({.system = random_system<2>(120, {21, 21}, {P, W}, 0.15, 1.5, 4), .slab = 0.3}, 300);
+  expect_the_same_beside_cells<3>(
+      {.system = random_system<3>(150, {8, 7, 9}, {P, O, W}, 0.2, 0.7, 7), .g = {0.1, 0, -1}, .slab = 1, .slabs = 3}, 300);
+  expect_the_same_beside_cells<3>({.system = random_system<3>(5, {2.3, 2.1, 2.5}, {P, P, P}, 0.1, 0.5, 10), .slab = 5},
+                                  50);
+  expect_the_same_beside_cells<2>(
+      {.system = random_system<2>(60, {9, 9}, {W, P}, 0.1, 0.4, 13), .growth = 0.1, .slab = 0.5, .slabs = 3}, 100);
+}
+
 Case<3> lattice() {  // with speeds of 1: whole layers collide at one instant
   std::vector<Vec<3>> x, v;
   for (int i = 0; i < 6; ++i)
