@@ -62,13 +62,12 @@ void EventSearch<D>::choose(double now) {
       larges_ = std::make_unique<LargeSpheres<D>>(*cells_, flights_.packing(), reaches_, tuning_.small(),
                                                   tuning_.skin(), queue_.plans());
     for (Slot i = 0; i < flights_.size(); ++i) {
-      if (larges_ && larges_->has(i)) {
-        larges_->renew(i, flights_.at(i, now).x);
-        continue;
-      }
+      if (larges_ && larges_->has(i)) continue;
       queue_[i].where.cell = cells_->place(flights_.at(i, now).x);
       cells_->insert(i, queue_[i].where.cell);
     }
+    for (Slot i = 0; larges_ && i < flights_.size(); ++i)
+      if (larges_->has(i)) larges_->renew(i, flights_.at(i, now).x);
     return;
   }
   double skin = tuning_.skin();
@@ -280,7 +279,7 @@ void EventSearch<D>::cross(Slot i, double now) {
   const ScanResult first = cells_->scan_ahead(setting_, i, a.where.cell, a.face, found_);
   predict_crossing(a, i, flights_, box_, *cells_, now);
   plan_found(i, first, found_);
-  if (larges_ && larges_->parts(before, a.where.cell)) scan(larges_->around(i, a.where.cell), false);
+  if (larges_ && larges_->parts(before, a.where.cell)) scan(larges_->pass(i, before, a.where.cell), false);
   queue_.schedule(i);
 }
 

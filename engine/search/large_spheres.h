@@ -3,10 +3,12 @@
 // Spheres that are much larger than most, beside cells for the small ones.
 //
 // A cell as large as the largest sphere would hold many small ones. So only small spheres are in linked cells, which
-// are as large as the largest of them. A large sphere has a region instead: all cells in which a small sphere may touch
-// it, while it is within `skin` of the place where the region was made. The cells are combined into blocks, and each
-// block has a list of the large spheres whose regions hold it, so that a small sphere finds them in the block of its
-// own cell. Two large spheres can touch only where their regions overlap; each has a list of such others.
+// are as large as the largest of them. The cells are combined into blocks. A large sphere has a region instead of a
+// cell: all blocks in which a small sphere may touch it, while it is within `skin` of the place where the region was
+// made. It has a list of the small spheres in its region, and each block has a list of the large spheres whose regions
+// hold it. When a small sphere moves into another block, it finds the large spheres that are new there, and the lists
+// of large spheres are corrected. Two large spheres can touch only where their regions overlap; each is then on the
+// list of the other.
 //
 // Other programs have a grid for each octave of radii (Ogarko, Luding, Comput. Phys. Commun. 183 (2012) 931). Then each
 // small sphere searches the large cells around it after each collision, and a large one all small cells in them.
@@ -29,26 +31,62 @@ class LargeSpheres {
   bool has(Slot i) const { return number_[i] != kSmall; }
   double skin() const { return skin_; }
 
-  /// The large sphere is now at x: makes a new region for it, around this place.
+  /// The large sphere is now at x: makes a new region for it, around this place. All small spheres must be in the cells.
   void renew(Slot i, const Vec<D>& x);
-  /// Whether a small sphere that has moved from one cell to another finds other large spheres.
+  /// Whether a small sphere that has moved from one cell to another is in another block.
   bool parts(const CellPlace<D>& one, const CellPlace<D>& other) const {
     return block(one) != block(other) || one.boxes != other.boxes;
   }
+  /// A small sphere has moved from one block to another: corrects the lists. Returns the large spheres that it finds
+  /// there, as input of the kernels; valid until the next call.
+  ScanTask pass(Slot i, const CellPlace<D>& from, const CellPlace<D>& to);
 
   /// All large spheres that a small one in this place may touch, as input of the kernels; valid until the next call.
   ScanTask around(Slot i, const CellPlace<D>& place);
   /// All spheres that a large one may touch, as input of the kernels; valid until the next call.
-  ScanTask around(Slot i);
+  ScanTask around(Slot i) { return large_[number_[i]].list.task(i, packing_.pack(i, 0)); }
 
  private:
   static constexpr std::uint32_t kSmall = 0xffffffff;
-  /// Along each axis. Regions are made of blocks: larger ones hold more small spheres, smaller ones are more vectors.
+  /// Along each axis. With larger blocks regions hold more small spheres, with smaller ones there are more lists.
   static constexpr int kCellsOfBlock = 2;
-  static constexpr unsigned kPadding = 8;  // candidates behind the last one
+
+  /// Candidates, first those in the same box.
+  class List {
+   public:
+    void clear() { count_ = same_ = 0; }
+    std::span<const std::uint32_t> all() const { return {entries_.data(), count_}; }
+    void add(std::uint32_t candidate, bool same) {
+      if (entries_.size() < count_ + kPadding + 1) entries_.resize(2 * (count_ + kPadding + 1));
+      entries_[count_] = candidate;
+      if (same) std::swap(entries_[count_], entries_[same_++]);
+      ++count_;
+    }
+    void drop(std::uint32_t candidate) {
+      unsigned at = 0;
+      while (entries_[at] != candidate) ++at;
+      if (at < same_) {
+        entries_[at] = entries_[--same_];
+        at = same_;
+      }
+      entries_[at] = entries_[--count_];
+    }
+    /// For sphere i, which is `self` as a candidate in its own box.
+    ScanTask task(Slot i, std::uint32_t self) {
+      if (entries_.empty()) entries_.resize(kPadding);
+      std::fill_n(entries_.begin() + count_, kPadding, self);
+      return {i, entries_.data(), count_, same_};
+    }
+
+   private:
+    static constexpr unsigned kPadding = 8;
+    std::vector<std::uint32_t> entries_;
+    unsigned count_ = 0, same_ = 0;
+  };
+
   struct Large {
-    Cell<D> low, high;                // of the region, in unwrapped cells
-    std::vector<std::uint32_t> near;  // the other large spheres
+    Cell<D> low, high;  // of the blocks that may belong to the region, in unwrapped cells
+    List list;
   };
 
   std::size_t block(const CellPlace<D>& place) const {
@@ -57,12 +95,12 @@ class LargeSpheres {
     return at;
   }
   template <class Visit>
-  void for_each_block(const Large& large, Visit&& visit) const;
+  void for_each_block(Slot i, Visit&& visit) const;
   Vec<D> centre(Slot i) const { return Eigen::Map<const Vec<D>>(next_events_[i].where.centre); }
-  void find(Slot i, const Image<D>& away, std::span<const std::uint32_t> listed, std::vector<std::uint32_t>& found) const;
-  void check(Slot i, std::span<const std::uint32_t> found) const;
-  void add(std::uint32_t candidate);
-  ScanTask task(Slot i);
+  double range(Slot i) const { return (reach_[i] + small_ + skin_) * (1 + 1e-9); }
+  std::uint32_t seen(std::uint32_t listed, const CellPlace<D>& place) const;
+  void add(List& list, std::uint32_t candidate) const { list.add(candidate, packing_.linear(candidate) == 0); }
+  void meet(Slot i, const Image<D>& away, std::span<const std::uint32_t> listed);
 
   const LinkedCells<D>& cells_;
   const Packing<D>& packing_;
@@ -75,8 +113,8 @@ class LargeSpheres {
   // By block: the large spheres whose regions hold it, with the box of the block as seen from the box of their centre.
   std::vector<std::vector<std::uint32_t>> listed_;
   std::int32_t widest_ = 0;  // the farthest box that a region has reached
-  std::vector<std::uint32_t> found_, candidates_;
-  unsigned count_ = 0, same_ = 0;
+  std::vector<std::uint32_t> found_;
+  List around_;
 };
 
 }  // namespace carom

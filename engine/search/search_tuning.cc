@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <cstdio>
+#include <cstdlib>
 
 #include "engine/base/elementary.h"
 
@@ -125,6 +127,7 @@ void SearchTuning::choose(const SearchSituation& situation, const EventCounts& c
 
 void SearchTuning::choose_first(const SearchSituation& s) {
   chosen_ = true;
+  if (const char* split = std::getenv("CAROM_SPLIT")) { lists_ = false; std::sscanf(split, "%lf,%lf,%lf", &small_, &cell_, &skin_); return; }
   if (options_.method == SearchOptions::Method::small_cells) {
     lists_ = false;
     small_ = options_.small;
