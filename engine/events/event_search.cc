@@ -53,6 +53,7 @@ void EventSearch<D>::choose(double now) {
   }
   SearchSituation situation = situation_of<D>(box_, radii, extent);
   situation.largest = 2 * largest_;
+  if (!sizes_ && !flights_.equal() && !box_.sheared()) situation.classes = size_classes();
   tuning_.choose(situation, counts_);
   if (!tuning_.lists()) {
     cells_ =
@@ -82,6 +83,23 @@ void EventSearch<D>::choose(double now) {
   if (box_.sheared() && max_displacement_ > 0) max_displacement_ += kStrainOfWindow * (skin + max_displacement_);
   lists_->build(
       flights_.size(), [&](Slot i) { return place(i, now); }, extent, max_displacement_);
+}
+
+/// The spheres in octaves of reach.
+template <int D>
+std::vector<SearchSituation::SizeClass> EventSearch<D>::size_classes() const {
+  constexpr int kOctaves = 31;
+  std::vector<SearchSituation::SizeClass> classes(kOctaves);
+  for (Slot i = 0; i < flights_.size(); ++i) {
+    const double reach = reaches_[i];
+    SearchSituation::SizeClass& of = classes[reach > 0 ? std::clamp(std::ilogb(largest_ / reach), 0, kOctaves - 1)
+                                                       : kOctaves - 1];
+    ++of.number;
+    of.mean += (2 * reach - of.mean) / of.number;
+    of.largest = std::max(of.largest, 2 * reach);
+    of.speed_squared += (flights_[i].v.squaredNorm() - of.speed_squared) / of.number;
+  }
+  return classes;
 }
 
 /// The list of a sphere as input of the kernels.

@@ -68,6 +68,7 @@ class EventSearch {
 
  private:
   void choose(double now);
+  std::vector<SearchSituation::SizeClass> size_classes() const;
   void foresee(Slot i, double now);
   void foresee_in_cells(Slot i, double now);
   void foresee_large(Slot i, double now);

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <cstdio>
-#include <cstdlib>
 
 #include "engine/base/elementary.h"
 
@@ -17,9 +15,12 @@ constexpr double kPrediction = 400, kCandidate = 32;  // per prediction and per 
 constexpr double kRenewal = 4500;                     // per renewal of a list
 constexpr double kCellHead = 9, kCellCandidate = 60;  // per prediction on cells: for each cell and each candidate
 constexpr double kCrossing = 550;                     // per crossing, without new cells and candidates
+constexpr double kStalePlans = 2;                     // predictions of a large sphere among small ones per contact
+constexpr double kBlock = 200, kMember = 60;          // per renewal of a region: for each block and each small sphere
 constexpr double kFewestPredictions = 20000;          // before counts are used
 constexpr double kCrowded = 40, kUneven = 2.5;        // candidates per scan of cells above which lists are cheaper
 constexpr double kLargestSkin = 0.8, kSmallestSkin = 0.02, kCrowdedSkin = 0.4;  // in mean diameters
+constexpr double kDenseMixture = 0.42;  // packing fraction above which lists are faster
 // The candidates of a mean sphere up to which a larger skin is cheaper in dilute mixtures: with about so many,
 // diameters 1:10 took the fewest instructions at packing fractions of 0.02, 0.05 and 0.1, and discs at 0.02 to 0.35.
 constexpr double kShortList = 12;
@@ -50,19 +51,42 @@ double short_list_skin(const SearchSituation& s) {
   return 0.5 * (elementary::pow(kShortList / (s.density * unit), 1.0 / s.dimension) - s.mean);
 }
 
+struct CellChoice {
+  double edge, cost;  // cost in instructions, for a sphere that flies the length 1
+};
+
 /// The cheapest edge of cells: small cells are crossed often, large ones hold many candidates.
-double best_cell(const SearchSituation& s) {
+CellChoice best_cell(const SearchSituation& s) {
   const double around = cells_around(s.dimension), ahead = around / 3;
-  double best = s.largest, least = std::numeric_limits<double>::infinity();
+  CellChoice best{s.largest, std::numeric_limits<double>::infinity()};
   for (double edge = s.largest; in_cell(s, edge) < 3; edge *= 1.1) {
     const double inside = in_cell(s, edge);
     const double predictions = 1.1 * contacts_a_length(s),
                  crossings = s.dimension * std::sqrt(2 / std::numbers::pi) / edge;
     const double cost = predictions * (kPrediction + around * (kCellHead + kCellCandidate * inside)) +
                         crossings * (kCrossing + ahead * (kCellHead + kCellCandidate * inside));
-    if (cost < least) least = cost, best = edge;
+    if (cost < best.cost) best = {edge, cost};
   }
   return best;
+}
+
+/// The volume or area of a ball.
+double ball(int dimension, double radius) {
+  return (dimension == 2 ? std::numbers::pi : 4 * std::numbers::pi / 3) * elementary::pow(radius, dimension);
+}
+
+/// The work for a large sphere beside cells with small ones, in instructions, while a small one flies the length 1.
+/// `speed`: of large spheres relative to that of small ones.
+double cost_of_large(const SearchSituation& smalls, double edge, double radius, double speed, double skin) {
+  const int dimension = smalls.dimension;
+  const double reach = radius + 0.5 * smalls.largest, region = ball(dimension, reach + skin + edge);
+  const double candidates = smalls.density * (region - ball(dimension, radius));
+  SearchSituation mixed = smalls;  // equal spheres that are met as often
+  mixed.largest = reach;
+  const double predictions = kStalePlans * contacts_a_length(mixed) * std::sqrt(0.5 * (1 + speed * speed));
+  const double blocks = region / elementary::pow(2 * edge, dimension);
+  return predictions * (kPrediction + candidates * kCandidate) +
+         speed / skin * (kRenewal + blocks * kBlock + candidates * kMember);
 }
 
 }  // namespace
@@ -104,6 +128,8 @@ void SearchTuning::choose(const SearchSituation& situation, const EventCounts& c
   if (!chosen_) {
     choose_first(situation);
     before_ = counts;
+  } else if (small_ < kNoLimit && options_.method == SearchOptions::Method::automatic) {
+    split(situation, kNoLimit);  // spheres may have grown
   }
   const auto predictions = static_cast<double>(counts.predictions - before_.predictions);
   if (predictions > kFewestPredictions) {
@@ -114,7 +140,7 @@ void SearchTuning::choose(const SearchSituation& situation, const EventCounts& c
     // is crowded.
     const double scans = predictions + static_cast<double>(counts.crossings - before_.crossings) / 3;
     const double even = cells_around(situation.dimension) * in_cell(situation, cell_);
-    if (!lists_ && options_.method == SearchOptions::Method::automatic &&
+    if (!lists_ && small_ == kNoLimit && options_.method == SearchOptions::Method::automatic &&
         candidates > std::max(kCrowded, kUneven * even) * scans) {
       lists_ = true;
       if (options_.skin == 0) skin_ = std::min(skin_, kCrowdedSkin * situation.mean);  // the mean density says little
@@ -127,7 +153,6 @@ void SearchTuning::choose(const SearchSituation& situation, const EventCounts& c
 
 void SearchTuning::choose_first(const SearchSituation& s) {
   chosen_ = true;
-  if (const char* split = std::getenv("CAROM_SPLIT")) { lists_ = false; std::sscanf(split, "%lf,%lf,%lf", &small_, &cell_, &skin_); return; }
   if (options_.method == SearchOptions::Method::small_cells) {
     lists_ = false;
     small_ = options_.small;
@@ -142,7 +167,41 @@ void SearchTuning::choose_first(const SearchSituation& s) {
   const double room = s.mean * (elementary::pow(close / filled, 1.0 / s.dimension) - 1);
   skin_ = options_.skin > 0 ? options_.skin
                             : std::clamp(2 * room, 0.1 * s.mean, std::max(kCrowdedSkin * s.mean, short_list_skin(s)));
-  cell_ = options_.cell > 0 ? options_.cell : best_cell(s);
+  cell_ = options_.cell > 0 ? options_.cell : best_cell(s).edge;
+  if (options_.method == SearchOptions::Method::automatic && s.filled < kDenseMixture)
+    split(s, lists_ ? kNoLimit : best_cell(s).cost);
+}
+
+/// Puts only spheres up to some octave of sizes into cells, if that is possible and cheaper than this for a sphere.
+void SearchTuning::split(const SearchSituation& s, double cost_now) {
+  double all = 0, sum = 0, squares = 0, smalls = 0;
+  for (const SearchSituation::SizeClass& each : s.classes) all += each.number;
+  double least = all * cost_now;
+  for (std::size_t k = s.classes.size(); k-- > 1;) {  // from the smallest spheres up; some are always beside the cells
+    const SearchSituation::SizeClass& added = s.classes[k];
+    if (added.number == 0) continue;
+    smalls += added.number;
+    sum += added.number * added.mean;
+    squares += added.number * added.speed_squared;
+    const SearchSituation small{s.dimension, s.density * smalls / all, s.filled, sum / smalls, added.largest, {}};
+    const CellChoice cells = best_cell(small);
+    for (const double skin : {0.25 * small.mean, 0.5 * small.mean, small.mean, 2 * small.mean}) {
+      double cost = smalls * cells.cost;
+      for (std::size_t q = 0; q < k; ++q) {
+        const SearchSituation::SizeClass& large = s.classes[q];
+        const double speed = squares > 0 ? std::sqrt(large.speed_squared * smalls / squares) : 1;
+        if (large.number > 0)
+          cost += large.number * cost_of_large(small, cells.edge, 0.5 * large.largest, speed, skin);
+      }
+      if (cost < least) {
+        least = cost;
+        lists_ = false;
+        small_ = 0.5 * small.largest * (1 + 1e-9);
+        cell_ = cells.edge;
+        skin_ = skin;
+      }
+    }
+  }
 }
 
 /// Scales the skin to the lowest sum of the costs of predictions, which increase with the candidates, and of renewals.

@@ -7,7 +7,9 @@
 // regions between two contacts, and cells are cheaper there because a crossing searches few new cells; in a dense fluid
 // lists are cheaper, because a sphere has many contacts before it leaves its region.
 
+#include <limits>
 #include <span>
+#include <vector>
 
 #include "engine/base/event_counts.h"
 #include "engine/search/cell_grid.h"
@@ -32,6 +34,12 @@ struct SearchSituation {
   double density = 0;            ///< particles per volume
   double filled = 0;             ///< packing fraction
   double mean = 0, largest = 0;  ///< diameters
+  /// The spheres in octaves of sizes, the largest ones first; empty if all must be searched in one way.
+  struct SizeClass {
+    double number = 0, mean = 0, largest = 0;  ///< of spheres; diameters
+    double speed_squared = 0;                  ///< mean
+  };
+  std::vector<SizeClass> classes{};
 };
 
 /// For `extent.particles` particles; `numbers` holds the number of particles of each radius, equal numbers if it is
@@ -59,11 +67,13 @@ class SearchTuning {
 
  private:
   void choose_first(const SearchSituation& situation);
+  void split(const SearchSituation& situation, double cost_now);
   void adapt_skin(const SearchSituation& situation, double candidates, double rebuilds);
 
   SearchOptions options_;
   bool chosen_ = false, lists_ = true;
-  double skin_ = 0, cell_ = 0, small_ = std::numeric_limits<double>::infinity();
+  static constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+  double skin_ = 0, cell_ = 0, small_ = kNoLimit;
   // The candidates grow as this power of the reach, and renewals as this power of the skin. These are rough values for
   // a dense fluid, until a change of the skin has shown better ones. Measured were 1.9 and −2.0 at a packing fraction
   // of 0.49, 3 and −1.5 at 0.33.

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "engine/base/record.h"
 #include "engine/ranks/id_blocks.h"
@@ -127,11 +128,13 @@ double default_epoch(const System<D>& system) {
   // The flow makes neighbours meet about once in a strain, also if they are cold.
   epoch = std::min(epoch, kEventsOfEpoch / system.box.fastest_shear());
   if (bath.acts_at_ends()) epoch = std::min(epoch, kEpochOfRelaxation / bath.relaxation_rate());
-  // The images of the fastest particles, also in equilibrium, must fit into a candidate on any number of ranks.
-  const double speed = std::max(fastest, 5 * light_speed);
+  // The image of a sphere, as another one sees it, perhaps through a face, must fit into a candidate on any number of
+  // ranks. In equilibrium two of 10⁷ components of a velocity are larger than five times the thermal speed; those of
+  // relative velocities are larger by √2.
+  const double speed = std::max(fastest, 5 * light_speed) * std::numbers::sqrt2;
   const Packing<D> packing(1, system.size());  // largest() depends on the number of particles only
   for (int k = 0; k < D; ++k)
-    if (system.box.periodic(k)) epoch = std::min(epoch, packing.largest() * system.box.edges[k] / speed);
+    if (system.box.periodic(k)) epoch = std::min(epoch, std::max(packing.largest() - 1, 1) * system.box.edges[k] / speed);
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), epoch, std::chars_format::scientific, 1).ptr;
   double rounded = epoch;

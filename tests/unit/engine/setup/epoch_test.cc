@@ -81,7 +81,7 @@ TEST(Epoch, FollowsTheEventsOfTheLast) {
   EXPECT_EQ(ramp(1, 1e8), ramp(1e8, 1e8));
 }
 
-/// On periodic axes the images of the fastest particle must fit into their bits; the lightest particle in equilibrium
+/// On periodic axes the images of two particles as fast as the fastest must fit into their bits; the lightest particle in equilibrium
 /// moves at most four boxes.
 TEST(Epoch, EndsBeforeAParticleHasComeThroughTooManyBoxes) {
   const auto usual = test::hard_spheres<3>(4, 0.3);
@@ -93,7 +93,7 @@ TEST(Epoch, EndsBeforeAParticleHasComeThroughTooManyBoxes) {
     made->box.boundary.fill(boundary);
     return made;
   };
-  EXPECT_NEAR(default_epoch(*system(1e10, Boundary::periodic)) * 1e10 / (boxes * edge), 1, 0.05);
+  EXPECT_NEAR(default_epoch(*system(1e10, Boundary::periodic)) * 1e10 / ((boxes - 1) / std::numbers::sqrt2 * edge), 1, 0.05);
   for (const Boundary boundary : {Boundary::periodic, Boundary::wall})
     EXPECT_NEAR(default_epoch(*system(0, boundary)) * 1e8 / (4 * edge), 1, 0.05);
 }
