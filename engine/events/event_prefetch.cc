@@ -54,11 +54,12 @@ void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, co
 
 template <int D>
 void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, const LinkedCells<D>& cells,
-                       Candidates& found, bool large) {
+                       const LargeSpheres<D>* larges, Candidates& found, bool large) {
   const View<D> view(queue, flights);
+  const auto in_cell = [&](Slot i) { return !larges || !larges->has(i); };
   if (!large) {
     if (const CalendarEntry* const later = queue.upcoming(3)) view.fetch_sphere(later->slot);
-    if (const CalendarEntry* const next = queue.upcoming(1))
+    if (const CalendarEntry* const next = queue.upcoming(1); next && in_cell(next->slot))
       cells.prefetch(view.plans[next->slot].where.cell, 0, 0, found);
     return;
   }
@@ -67,26 +68,28 @@ void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, co
   const auto step = [](const NextEvent<D>& a) { return a.contact <= a.update ? 0 : a.face % 2 == 1 ? 1 : -1; };
   if (const CalendarEntry* const later = queue.upcoming(8)) {
     view.fetch_sphere(later->slot);
-    cells.prefetch(later->slot);
+    if (in_cell(later->slot)) cells.prefetch(later->slot);
   }
   if (const CalendarEntry* const later = queue.upcoming(5)) {
     const NextEvent<D>& a = view.plans[later->slot];
-    cells.prefetch(a.where.cell, a.face / 2, step(a), found);
+    if (in_cell(later->slot)) cells.prefetch(a.where.cell, a.face / 2, step(a), found);
     if (meets(a)) view.fetch_sphere(view.partner(a));
   }
   if (const CalendarEntry* const later = queue.upcoming(3)) {
     const NextEvent<D>& a = view.plans[later->slot];
-    cells.prefetch_spheres(a.where.cell, a.face / 2, step(a), found, fetch);
-    if (meets(a)) cells.prefetch(view.plans[view.partner(a)].where.cell, 0, 0, found);
+    if (in_cell(later->slot)) cells.prefetch_spheres(a.where.cell, a.face / 2, step(a), found, fetch);
+    if (meets(a) && in_cell(view.partner(a))) cells.prefetch(view.plans[view.partner(a)].where.cell, 0, 0, found);
   }
   if (const CalendarEntry* const next = queue.upcoming(1))
-    if (const NextEvent<D>& a = view.plans[next->slot]; meets(a))
+    if (const NextEvent<D>& a = view.plans[next->slot]; meets(a) && in_cell(view.partner(a)))
       cells.prefetch_spheres(view.plans[view.partner(a)].where.cell, 0, 0, found, fetch);
 }
 
 template void prefetch_upcoming(const EventQueue<2>&, const Flights<2>&, const SkinLists<2>&, bool);
 template void prefetch_upcoming(const EventQueue<3>&, const Flights<3>&, const SkinLists<3>&, bool);
-template void prefetch_upcoming(const EventQueue<2>&, const Flights<2>&, const LinkedCells<2>&, Candidates&, bool);
-template void prefetch_upcoming(const EventQueue<3>&, const Flights<3>&, const LinkedCells<3>&, Candidates&, bool);
+template void prefetch_upcoming(const EventQueue<2>&, const Flights<2>&, const LinkedCells<2>&, const LargeSpheres<2>*,
+                                Candidates&, bool);
+template void prefetch_upcoming(const EventQueue<3>&, const Flights<3>&, const LinkedCells<3>&, const LargeSpheres<3>*,
+                                Candidates&, bool);
 
 }  // namespace carom

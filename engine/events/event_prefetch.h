@@ -6,6 +6,7 @@
 // them, their records. Each step waits for memory, so the steps are spread over the preceding events.
 
 #include "engine/events/event_queue.h"
+#include "engine/search/large_spheres.h"
 #include "engine/search/linked_cells.h"
 #include "engine/search/skin_lists.h"
 
@@ -19,6 +20,6 @@ void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, co
 /// `found` is working memory.
 template <int D>
 void prefetch_upcoming(const EventQueue<D>& queue, const Flights<D>& flights, const LinkedCells<D>& cells,
-                       Candidates& found, bool large);
+                       const LargeSpheres<D>* larges, Candidates& found, bool large);
 
 }  // namespace carom

@@ -92,8 +92,8 @@ std::vector<SearchSituation::SizeClass> EventSearch<D>::size_classes() const {
   std::vector<SearchSituation::SizeClass> classes(kOctaves);
   for (Slot i = 0; i < flights_.size(); ++i) {
     const double reach = reaches_[i];
-    SearchSituation::SizeClass& of = classes[reach > 0 ? std::clamp(std::ilogb(largest_ / reach), 0, kOctaves - 1)
-                                                       : kOctaves - 1];
+    SearchSituation::SizeClass& of =
+        classes[reach > 0 ? std::clamp(std::ilogb(largest_ / reach), 0, kOctaves - 1) : kOctaves - 1];
     ++of.number;
     of.mean += (2 * reach - of.mean) / of.number;
     of.largest = std::max(of.largest, 2 * reach);

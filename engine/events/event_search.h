@@ -57,11 +57,11 @@ class EventSearch {
 
   /// Starts to prefetch the data of the next events.
   void prefetch() {
-    if (small_ || larges_) return;
+    if (small_) return;
     if (lists_)
       prefetch_upcoming(queue_, flights_, *lists_, large_);
     else
-      prefetch_upcoming(queue_, flights_, *cells_, found_, large_);
+      prefetch_upcoming(queue_, flights_, *cells_, larges_.get(), found_, large_);
   }
 
   const EventCounts& counts() const { return counts_; }

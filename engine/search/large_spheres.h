@@ -31,7 +31,8 @@ class LargeSpheres {
   bool has(Slot i) const { return number_[i] != kSmall; }
   double skin() const { return skin_; }
 
-  /// The large sphere is now at x: makes a new region for it, around this place. All small spheres must be in the cells.
+  /// The large sphere is now at x: makes a new region for it, around this place. All small spheres must be in the
+  /// cells.
   void renew(Slot i, const Vec<D>& x);
   /// Whether a small sphere that has moved from one cell to another is in another block.
   bool parts(const CellPlace<D>& one, const CellPlace<D>& other) const {

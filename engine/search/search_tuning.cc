@@ -16,11 +16,19 @@ constexpr double kRenewal = 4500;                     // per renewal of a list
 constexpr double kCellHead = 9, kCellCandidate = 60;  // per prediction on cells: for each cell and each candidate
 constexpr double kCrossing = 550;                     // per crossing, without new cells and candidates
 constexpr double kStalePlans = 2;                     // predictions of a large sphere among small ones per contact
-constexpr double kBlock = 200, kMember = 60;          // per renewal of a region: for each block and each small sphere
+constexpr double kBlock = 400, kMember = 60;          // per renewal of a region: for each block and each small sphere
+constexpr double kScan = 60;                          // per scan of the large spheres of a block
+constexpr double kCompare = 8, kNew = 0.3;            // per crossing of blocks: for two lists; share of new spheres
 constexpr double kFewestPredictions = 20000;          // before counts are used
 constexpr double kCrowded = 40, kUneven = 2.5;        // candidates per scan of cells above which lists are cheaper
 constexpr double kLargestSkin = 0.8, kSmallestSkin = 0.02, kCrowdedSkin = 0.4;  // in mean diameters
-constexpr double kDenseMixture = 0.42;  // packing fraction above which lists are faster
+// Cells for all spheres are kept unless large ones beside them seem cheaper by this factor, which is as rough as the
+// estimates: at 0.1, diameters 1:2 are faster in one grid, 1:2.5 with the large ones beside it, and both get that.
+constexpr double kCheaper = 0.7;
+// Large spheres are beside the cells up to this packing fraction if a cell for the largest sphere would hold so many,
+// otherwise up to dense(). With diameters 1:10, lists take twice the instructions at 0.3, 1.3 times at 0.42 and as many
+// at 0.5; at 0.4 lists are faster for 1:2 and 1:2.5 (3.4 and 6.3 in a cell), slower for 1:4 (25).
+constexpr double kDenseMixture = 0.5, kManyInCell = 12;
 // The candidates of a mean sphere up to which a larger skin is cheaper in dilute mixtures: with about so many,
 // diameters 1:10 took the fewest instructions at packing fractions of 0.02, 0.05 and 0.1, and discs at 0.02 to 0.35.
 constexpr double kShortList = 12;
@@ -59,9 +67,11 @@ struct CellChoice {
 CellChoice best_cell(const SearchSituation& s) {
   const double around = cells_around(s.dimension), ahead = around / 3;
   CellChoice best{s.largest, std::numeric_limits<double>::infinity()};
+  SearchSituation met = s;  // spheres of the mean diameter
+  met.largest = s.mean;
   for (double edge = s.largest; in_cell(s, edge) < 3; edge *= 1.1) {
     const double inside = in_cell(s, edge);
-    const double predictions = 1.1 * contacts_a_length(s),
+    const double predictions = 1.1 * contacts_a_length(met),
                  crossings = s.dimension * std::sqrt(2 / std::numbers::pi) / edge;
     const double cost = predictions * (kPrediction + around * (kCellHead + kCellCandidate * inside)) +
                         crossings * (kCrossing + ahead * (kCellHead + kCellCandidate * inside));
@@ -75,19 +85,32 @@ double ball(int dimension, double radius) {
   return (dimension == 2 ? std::numbers::pi : 4 * std::numbers::pi / 3) * elementary::pow(radius, dimension);
 }
 
-/// The work for a large sphere beside cells with small ones, in instructions, while a small one flies the length 1.
-/// `speed`: of large spheres relative to that of small ones.
-double cost_of_large(const SearchSituation& smalls, double edge, double radius, double speed, double skin) {
-  const int dimension = smalls.dimension;
-  const double reach = radius + 0.5 * smalls.largest, region = ball(dimension, reach + skin + edge);
-  const double candidates = smalls.density * (region - ball(dimension, radius));
-  SearchSituation mixed = smalls;  // equal spheres that are met as often
-  mixed.largest = reach;
-  const double predictions = kStalePlans * contacts_a_length(mixed) * std::sqrt(0.5 * (1 + speed * speed));
-  const double blocks = region / elementary::pow(2 * edge, dimension);
-  return predictions * (kPrediction + candidates * kCandidate) +
-         speed / skin * (kRenewal + blocks * kBlock + candidates * kMember);
-}
+/// Small spheres in cells of this edge, and large ones beside them, which may move by `skin`.
+struct Beside {
+  SearchSituation smalls;
+  double edge, skin;
+
+  double crossings() const { return smalls.dimension * std::sqrt(2 / std::numbers::pi) / edge; }
+  /// The volume of the region of a large sphere, and the small spheres in it.
+  double region(double radius) const { return ball(smalls.dimension, radius + 0.5 * smalls.largest + skin + edge); }
+  double candidates(double radius) const { return smalls.density * (region(radius) - ball(smalls.dimension, radius)); }
+  /// The work for a large sphere, in instructions, while a small one flies the length 1; `speed` is relative to that of
+  /// small spheres.
+  double cost_of_large(double radius, double speed) const {
+    SearchSituation met = smalls;  // equal spheres that are met as often
+    met.largest = radius + 0.5 * smalls.largest;
+    const double predictions = kStalePlans * contacts_a_length(met) * std::sqrt(0.5 * (1 + speed * speed));
+    return predictions * (kPrediction + candidates(radius) * kCandidate) +
+           speed / skin *
+               (kRenewal + region(radius) / elementary::pow(2 * edge, smalls.dimension) * kBlock +
+                candidates(radius) * kMember);
+  }
+  /// The work for a small sphere because so many large ones are listed in its block, which have so many candidates.
+  double cost_of_small(double listed, double candidates) const {
+    return 1.1 * contacts_a_length(smalls) * (kScan + listed * kCandidate) +
+           0.5 * crossings() * (kScan + kCompare * listed * listed + kNew * listed * (kScan + candidates));
+  }
+};
 
 }  // namespace
 
@@ -168,7 +191,8 @@ void SearchTuning::choose_first(const SearchSituation& s) {
   skin_ = options_.skin > 0 ? options_.skin
                             : std::clamp(2 * room, 0.1 * s.mean, std::max(kCrowdedSkin * s.mean, short_list_skin(s)));
   cell_ = options_.cell > 0 ? options_.cell : best_cell(s).edge;
-  if (options_.method == SearchOptions::Method::automatic && s.filled < kDenseMixture)
+  if (options_.method == SearchOptions::Method::automatic &&
+      s.filled < (in_cell(s, s.largest) > kManyInCell ? kDenseMixture : dense(s.dimension)))
     split(s, lists_ ? kNoLimit : best_cell(s).cost);
 }
 
@@ -176,7 +200,7 @@ void SearchTuning::choose_first(const SearchSituation& s) {
 void SearchTuning::split(const SearchSituation& s, double cost_now) {
   double all = 0, sum = 0, squares = 0, smalls = 0;
   for (const SearchSituation::SizeClass& each : s.classes) all += each.number;
-  double least = all * cost_now;
+  double least = kCheaper * all * cost_now;
   for (std::size_t k = s.classes.size(); k-- > 1;) {  // from the smallest spheres up; some are always beside the cells
     const SearchSituation::SizeClass& added = s.classes[k];
     if (added.number == 0) continue;
@@ -186,13 +210,18 @@ void SearchTuning::split(const SearchSituation& s, double cost_now) {
     const SearchSituation small{s.dimension, s.density * smalls / all, s.filled, sum / smalls, added.largest, {}};
     const CellChoice cells = best_cell(small);
     for (const double skin : {0.25 * small.mean, 0.5 * small.mean, small.mean, 2 * small.mean}) {
-      double cost = smalls * cells.cost;
+      const Beside beside{small, cells.edge, skin};
+      double cost = smalls * cells.cost, listed = 0, candidates = 0;
       for (std::size_t q = 0; q < k; ++q) {
         const SearchSituation::SizeClass& large = s.classes[q];
+        if (large.number == 0) continue;
         const double speed = squares > 0 ? std::sqrt(large.speed_squared * smalls / squares) : 1;
-        if (large.number > 0)
-          cost += large.number * cost_of_large(small, cells.edge, 0.5 * large.largest, speed, skin);
+        const double radius = 0.5 * large.largest, share = large.number / all * s.density * beside.region(radius);
+        cost += large.number * beside.cost_of_large(radius, speed);
+        listed += share;
+        candidates += share * beside.candidates(radius);
       }
+      if (listed > 0) cost += smalls * beside.cost_of_small(listed, candidates / listed);
       if (cost < least) {
         least = cost;
         lists_ = false;

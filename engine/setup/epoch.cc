@@ -129,12 +129,13 @@ double default_epoch(const System<D>& system) {
   epoch = std::min(epoch, kEventsOfEpoch / system.box.fastest_shear());
   if (bath.acts_at_ends()) epoch = std::min(epoch, kEpochOfRelaxation / bath.relaxation_rate());
   // The image of a sphere, as another one sees it, perhaps through a face, must fit into a candidate on any number of
-  // ranks. In equilibrium two of 10⁷ components of a velocity are larger than five times the thermal speed; those of
-  // relative velocities are larger by √2.
-  const double speed = std::max(fastest, 5 * light_speed) * std::numbers::sqrt2;
+  // ranks. In equilibrium a component of a relative velocity has the standard deviation √2 of the thermal speed, and
+  // one of 10¹⁵ is larger than eight of them; a dilute gas of 10⁴ spheres has 10⁶ candidates in an epoch.
+  const double speed = std::max(2 * fastest, 8 * std::numbers::sqrt2 * light_speed);
   const Packing<D> packing(1, system.size());  // largest() depends on the number of particles only
   for (int k = 0; k < D; ++k)
-    if (system.box.periodic(k)) epoch = std::min(epoch, std::max(packing.largest() - 1, 1) * system.box.edges[k] / speed);
+    if (system.box.periodic(k))
+      epoch = std::min(epoch, std::max(packing.largest() - 1, 1) * system.box.edges[k] / speed);
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), epoch, std::chars_format::scientific, 1).ptr;
   double rounded = epoch;

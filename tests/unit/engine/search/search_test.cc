@@ -140,7 +140,8 @@ void expect_the_same_beside_cells(const Case<D>& c, std::size_t at_least) {
   for (const double share : {-1.0, 0.0, 0.2, 0.6, 0.95})
     for (const double skin : {0.03, 0.3, 1.5}) {
       const double small = least + share * (most - least);
-      const SearchOptions options{.method = Method::small_cells, .skin = skin * most, .cell = 0.5 * most, .small = small};
+      const SearchOptions options{
+          .method = Method::small_cells, .skin = skin * most, .cell = 0.5 * most, .small = small};
       expect_same(reference, run(c, options),
                   "up to " + std::to_string(small) + ", skin " + std::to_string(skin * most));
     }
@@ -151,7 +152,8 @@ TEST(Search, LargeSpheresBesideCells) {
                                   1000);
   expect_the_same_beside_cells<2>({.system = random_system<2>(120, {21, 21}, {P, W}, 0.15, 1.5, 4), .slab = 0.3}, 300);
   expect_the_same_beside_cells<3>(
-      {.system = random_system<3>(150, {8, 7, 9}, {P, O, W}, 0.2, 0.7, 7), .g = {0.1, 0, -1}, .slab = 1, .slabs = 3}, 300);
+      {.system = random_system<3>(150, {8, 7, 9}, {P, O, W}, 0.2, 0.7, 7), .g = {0.1, 0, -1}, .slab = 1, .slabs = 3},
+      300);
   expect_the_same_beside_cells<3>({.system = random_system<3>(5, {2.3, 2.1, 2.5}, {P, P, P}, 0.1, 0.5, 10), .slab = 5},
                                   50);
   expect_the_same_beside_cells<2>(
@@ -264,6 +266,29 @@ TEST(SearchTuning, TakesListsForDenseFluidsAndForMixtures) {
     EXPECT_TRUE(lists(fluid(dimension, filled, largest), Method::lists));
     EXPECT_FALSE(lists(fluid(dimension, filled, largest), Method::cells));
   }
+}
+
+/// Mixtures of two diameters, half of the volume each: few large spheres are beside the cells of small ones, unless all
+/// are dense or nearly as large.
+TEST(SearchTuning, PutsLargeSpheresBesideTheCellsOfSmallOnes) {
+  const auto tuned = [](double ratio, double filled, bool classes = true) {
+    const double large = 1 / (1 + std::pow(ratio, 3));
+    SearchSituation mixture{3, filled / 2 / (1 - large) / 0.524, filled, 1 + large * (ratio - 1), ratio};
+    if (classes) mixture.classes = {{large, ratio, ratio, std::pow(ratio, -3)}, {0}, {1 - large, 1, 1, 1}};
+    SearchTuning tuning({});
+    tuning.choose(mixture, {});
+    return tuning;
+  };
+  for (const double filled : {0.005, 0.05, 0.2, 0.4}) {
+    const SearchTuning ten = tuned(10, filled);
+    EXPECT_FALSE(ten.lists()) << filled;
+    EXPECT_NEAR(ten.small(), 0.5, 1e-6) << filled;
+    EXPECT_GE(ten.cell(), 1) << filled;
+    EXPECT_GT(ten.skin(), 0.1) << filled;
+    EXPECT_EQ(tuned(2, filled).lists(), filled == 0.4) << filled;
+  }
+  EXPECT_TRUE(tuned(10, 0.52).lists());
+  EXPECT_TRUE(tuned(10, 0.1, false).lists());
 }
 
 /// In a dilute gas most candidates are those of crossings, which are no sign of a crowded region.
