@@ -4,6 +4,7 @@
 
     tests/benchmarks/against_dynamo.py DIRECTORY --carom build/release/io/carom            # 10,000 spheres in dilute gases
     tests/benchmarks/against_dynamo.py DIRECTORY --carom build/release/io/carom --wells    # 10,976 spheres with square wells
+    tests/benchmarks/against_dynamo.py DIRECTORY --carom build/release/io/carom --sizes    # ten of them have the tenfold diameter
 
 DIRECTORY has the programs dynamod and dynarun, built as Release without the visualiser. DynamO starts from a lattice that has melted for
 60,000 events, with wells for 400,000; both programs run whole commands, without observables or frames. The tables have medians, in events
@@ -33,6 +34,7 @@ def main():
     parser.add_argument("--carom")
     parser.add_argument("--filled", type=float, nargs="+", default=[0.002, 0.005, 0.01], help="packing fractions")
     parser.add_argument("--wells", type=float, nargs="*", metavar="DENSITY", help="square wells at these densities; default: 0.5 0.8")
+    parser.add_argument("--sizes", action="store_true", help="diameters 1:10 and masses 1:1000 at packing fraction 0.005")
     parser.add_argument("--collisions", type=int, default=200000)
     parser.add_argument("--repeat", type=int, default=3)
     given = parser.parse_args()
@@ -69,7 +71,22 @@ def main():
             user_seconds([given.dynamo / "dynarun", "lattice.xml", "-E", "-c", "400000", "-o", "melt.xml"])
             print_row(density, [(of_wells(density), user_seconds([given.dynamo / "dynarun", "melt.xml", "-E", "-c", "400000", "-o", "end.xml"])
                                  / 400000) for _ in range(given.repeat)])
-        for filled in given.filled if given.wells is None else []:
+        if given.sizes:
+            small, large, filled = 10966, 10, 0.005  # at higher ones large spheres overlap on the lattice of dynamod
+            density = (small + large) * filled / (math.pi / 6 * (large + small / 1000))
+            user_seconds([given.dynamo / "dynamod", "-m", "8", "--f1", "0.1", "--f2", "0.001", "--i2", str(large), "-C", "14", "-d", repr(density),
+                          "-r", "1", "-s", "1", "-o", "lattice.xml"])
+            user_seconds([given.dynamo / "dynarun", "lattice.xml", "-E", "-c", "60000", "-o", "melt.xml"])
+            deck = tomllib.loads((ROOT / "inputs/ten-to-one.toml").read_text())
+            deck["particles"][0]["count"], deck["particles"][1]["count"] = large, small
+            deck["placement"]["packing_fraction"] = filled
+            deck["run"]["collisions"] = given.collisions
+            deck["output"] |= {"frame_interval": 1e9, "thermo_interval": 1e9}
+            (directory / "sizes.toml").write_text(toml_text(deck))
+            print_row(filled, [[user_seconds(command) / given.collisions for command in (
+                [carom, "run", "sizes.toml", "--quiet", "-o", "run"],
+                [given.dynamo / "dynarun", "melt.xml", "-E", "-c", str(given.collisions), "-o", "end.xml"])] for _ in range(given.repeat)])
+        for filled in given.filled if given.wells is None and not given.sizes else []:
             user_seconds([given.dynamo / "dynamod", "-m", "0", "--i1", "2", "-x", "20", "-y", "20", "-z", "25", "--rectangular-box",
                           "-d", repr(6 * filled / math.pi), "-s", "1", "-o", "lattice.xml"])
             user_seconds([given.dynamo / "dynarun", "lattice.xml", "-E", "-c", "60000", "-o", "melt.xml"])
