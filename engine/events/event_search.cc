@@ -133,7 +133,7 @@ void EventSearch<D>::foresee_in_cells(Slot i, double now) {
   if (larges_ && larges_->has(i)) return foresee_large(i, now);
   const ScanResult first = cells_->scan_around(setting_, i, a.where.cell, flights_[i].t == now, found_);
   plan_found(i, first, found_);
-  if (larges_) scan(larges_->around(i, a.where.cell), flights_[i].t == now);
+  if (larges_) scan_larges(larges_->around(i, a.where.cell), flights_[i].t == now);
   if (flights_.has_lone_events()) foresee_lone_events(i);
   predict_crossing(a, i, flights_, box_, *cells_, now);
 }
@@ -297,7 +297,7 @@ void EventSearch<D>::cross(Slot i, double now) {
   const ScanResult first = cells_->scan_ahead(setting_, i, a.where.cell, a.face, found_);
   predict_crossing(a, i, flights_, box_, *cells_, now);
   plan_found(i, first, found_);
-  if (larges_ && larges_->parts(before, a.where.cell)) scan(larges_->pass(i, before, a.where.cell), false);
+  if (larges_ && larges_->parts(before, a.where.cell)) scan_larges(larges_->pass(i, before, a.where.cell), false);
   queue_.schedule(i);
 }
 

@@ -78,6 +78,10 @@ class EventSearch {
   void foresee_update(Slot i, double now);
   ScanTask listed(Slot i) const;
   void scan(const ScanTask& task, bool latest);
+  /// scan() for large spheres near a small one: in most places there are none.
+  void scan_larges(const ScanTask& task, bool latest) {
+    if (task.n > 0) scan(task, latest);
+  }
   /// Plans the first contact with the candidates if it is earlier than the planned one.
   [[gnu::always_inline]] void plan_first(const ScanTask& task, const ScanResult& first) {
     if (flights_.has_steps()) [[unlikely]]

@@ -207,6 +207,7 @@ void SearchTuning::split(const SearchSituation& s, double cost_now) {
     smalls += added.number;
     sum += added.number * added.mean;
     squares += added.number * added.speed_squared;
+    if (added.largest == 0) continue;  // points do not meet each other
     const SearchSituation small{s.dimension, s.density * smalls / all, s.filled, sum / smalls, added.largest, {}};
     const CellChoice cells = best_cell(small);
     for (const double skin : {0.25 * small.mean, 0.5 * small.mean, small.mean, 2 * small.mean}) {
