@@ -58,7 +58,7 @@ class LargeSpheres {
     void clear() { count_ = same_ = 0; }
     std::span<const std::uint32_t> all() const { return {entries_.data(), count_}; }
     void add(std::uint32_t candidate, bool same) {
-      if (entries_.size() < count_ + kPadding + 1) entries_.resize(2 * (count_ + kPadding + 1));
+      if (entries_.size() < count_ + kPadding + 1) entries_.resize(std::size_t{2} * (count_ + kPadding + 1));
       entries_[count_] = candidate;
       if (same) std::swap(entries_[count_], entries_[same_++]);
       ++count_;

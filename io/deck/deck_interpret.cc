@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <limits>
-#include <ranges>
 
 #include "engine/laws/bath_options.h"
 #include "engine/laws/contact_options.h"
@@ -82,9 +82,10 @@ class Interpreter {
       if (const auto* pairs = std::get_if<std::vector<std::vector<double>>>(&rate)) {
         for (const std::vector<double>& pair : *pairs)
           if (pair.size() == 2) source_.shear_rates.push_back({pair[0], pair[1]});
-        const auto times = source_.shear_rates | std::views::keys;
-        if (pairs->empty() || times.size() != pairs->size() || !(times.front() >= 0) ||
-            !std::ranges::is_sorted(times, std::less_equal()))
+        const auto time = [](const std::array<double, 2>& each) { return each[0]; };
+        const auto& rates = source_.shear_rates;
+        if (pairs->empty() || rates.size() != pairs->size() || !(rates.front()[0] >= 0) ||
+            !std::ranges::is_sorted(rates, std::less_equal(), time))
           problems_.error(source_.shear, "'rate' is no list of pairs with increasing times, the first at least 0",
                           "give a number, or [[time, rate], …]");
       }
