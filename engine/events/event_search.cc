@@ -3,8 +3,6 @@
 
 #include <bit>
 
-#include "engine/events/surroundings.h"
-
 namespace carom {
 
 template <int D>
@@ -122,7 +120,7 @@ void EventSearch<D>::foresee(Slot i, double now) {
   queue_[i].contact = kNever;
   scan(listed(i), flights_[i].t == now);
   if (flights_.has_lone_events()) foresee_lone_events(i);
-  foresee_update(i, now);
+  foresee_leaving(i, now);
 }
 
 template <int D>
@@ -133,7 +131,7 @@ void EventSearch<D>::foresee_in_cells(Slot i, double now) {
   if (larges_ && larges_->has(i)) return foresee_large(i, now);
   const ScanResult first = cells_->scan_around(setting_, i, a.where.cell, flights_[i].t == now, found_);
   plan_found(i, first, found_);
-  if (larges_) scan_larges(larges_->around(i, a.where.cell), flights_[i].t == now);
+  if (larges_) scan_beside(larges_->around(i, a.where.cell), flights_[i].t == now);
   if (flights_.has_lone_events()) foresee_lone_events(i);
   predict_crossing(a, i, flights_, box_, *cells_, now);
 }
@@ -141,9 +139,9 @@ void EventSearch<D>::foresee_in_cells(Slot i, double now) {
 /// foresee_in_cells() for a sphere that is not in the cells.
 template <int D>
 void EventSearch<D>::foresee_large(Slot i, double now) {
-  scan(larges_->around(i), flights_[i].t == now);
+  scan_beside(larges_->around(i), flights_[i].t == now);
   if (flights_.has_lone_events()) foresee_lone_events(i);
-  predict_leaving(queue_[i], flights_[i], flights_, FlowFrame(), larges_->skin(), now);
+  foresee_update(i, now);
 }
 
 /// Makes a new region for a large sphere that is about to leave the one it has.
@@ -151,18 +149,14 @@ template <int D>
 void EventSearch<D>::renew_region(Slot i, double now) {
   ++counts_.rebuilds;
   larges_->renew(i, flights_.at(i, now).x);
-  scan(larges_->around(i), false);
-  predict_leaving(queue_[i], flights_[i], flights_, FlowFrame(), larges_->skin(), now);
+  scan_beside(larges_->around(i), false);
+  foresee_update(i, now);
   queue_.schedule(i);
 }
 
 /// Both spheres are scanned before anything depends on what was found, so that the processor overlaps the scans.
 template <int D>
 void EventSearch<D>::plan_two_in_cells(Slot i, Slot j, double now) {
-  if (larges_) {
-    for (const Slot one : {i, j}) plan(one, now);
-    return;
-  }
   counts_.predictions += 2;
   NextEvent<D>&a = queue_[i], &b = queue_[j];
   const ScanResult first = cells_->scan_around(setting_, i, a.where.cell, true, found_);
@@ -180,7 +174,11 @@ void EventSearch<D>::plan_two_in_cells(Slot i, Slot j, double now) {
 
 template <int D>
 void EventSearch<D>::plan_two(Slot i, Slot j, double now) {
-  if (cells_) return plan_two_in_cells(i, j, now);
+  if (cells_) {
+    if (!larges_) return plan_two_in_cells(i, j, now);
+    for (const Slot one : {i, j}) plan(one, now);
+    return;
+  }
   counts_.predictions += 2;
   const ScanTask task[2] = {listed(i), listed(j)};
   counts_.candidates += task[0].n + task[1].n;
@@ -191,7 +189,7 @@ void EventSearch<D>::plan_two(Slot i, Slot j, double now) {
     const Slot one = task[k].self;
     plan_first(task[k], first[k]);
     if (flights_.has_lone_events()) foresee_lone_events(one);
-    foresee_update(one, now);
+    foresee_leaving(one, now);
     queue_.schedule(one);
   }
 }
@@ -202,6 +200,11 @@ template <int D>
 void EventSearch<D>::scan(const ScanTask& task, bool latest) {
   counts_.candidates += task.n;
   plan_first(task, flights_.has_steps() ? ScanResult{} : kernels_.scan[D - 2](setting_, task, latest));
+}
+
+template <int D>
+void EventSearch<D>::scan_beside(const ScanTask& task, bool latest) {
+  if (task.n > 0) scan(task, latest);
 }
 
 /// Plans the first contact with the candidates, or the first step that a pair reaches, if it is earlier than the
@@ -249,7 +252,9 @@ void EventSearch<D>::foresee_lone_events(Slot i) {
 template <int D>
 void EventSearch<D>::foresee_update(Slot i, double now) {
   if (lists_)
-    predict_leaving(queue_[i], flights_[i], flights_, lists_->flow(), distance_left(i), now);
+    foresee_leaving(i, now);
+  else if (larges_ && larges_->has(i))
+    predict_leaving(queue_[i], flights_[i], flights_, FlowFrame(), larges_->skin(), now);
   else
     predict_crossing(queue_[i], i, flights_, box_, *cells_, now);
 }
@@ -297,7 +302,7 @@ void EventSearch<D>::cross(Slot i, double now) {
   const ScanResult first = cells_->scan_ahead(setting_, i, a.where.cell, a.face, found_);
   predict_crossing(a, i, flights_, box_, *cells_, now);
   plan_found(i, first, found_);
-  if (larges_ && larges_->parts(before, a.where.cell)) scan_larges(larges_->pass(i, before, a.where.cell), false);
+  if (larges_ && larges_->parts(before, a.where.cell)) scan_beside(larges_->pass(i, before, a.where.cell), false);
   queue_.schedule(i);
 }
 

@@ -12,6 +12,7 @@
 #include "engine/base/sizes.h"
 #include "engine/events/contact.h"
 #include "engine/events/event_prefetch.h"
+#include "engine/events/surroundings.h"
 #include "engine/search/large_spheres.h"
 #include "engine/search/search_tuning.h"
 
@@ -70,18 +71,21 @@ class EventSearch {
   void choose(double now);
   std::vector<SearchSituation::SizeClass> size_classes() const;
   void foresee(Slot i, double now);
-  void foresee_in_cells(Slot i, double now);
-  void foresee_large(Slot i, double now);
-  void renew_region(Slot i, double now);
-  void plan_two_in_cells(Slot i, Slot j, double now);
+  [[gnu::noinline]] void foresee_in_cells(Slot i, double now);
+  [[gnu::noinline]] void foresee_large(Slot i, double now);
+  [[gnu::noinline]] void renew_region(Slot i, double now);
+  [[gnu::noinline]] void plan_two_in_cells(Slot i, Slot j, double now);
   [[gnu::noinline]] void foresee_lone_events(Slot i);
   void foresee_update(Slot i, double now);
+  /// foresee_update() with lists.
+  [[gnu::always_inline]] void foresee_leaving(Slot i, double now) {
+    const double left = lists_->skin() - (!at_border_.empty() && at_border_[i] != 0 ? max_displacement_ : 0);
+    predict_leaving(queue_[i], flights_[i], flights_, lists_->flow(), left, now);
+  }
   ScanTask listed(Slot i) const;
   void scan(const ScanTask& task, bool latest);
-  /// scan() for large spheres near a small one: in most places there are none.
-  void scan_larges(const ScanTask& task, bool latest) {
-    if (task.n > 0) scan(task, latest);
-  }
+  /// scan() where spheres are large; the compiler would otherwise not inline scan() elsewhere.
+  [[gnu::noinline]] void scan_beside(const ScanTask& task, bool latest);
   /// Plans the first contact with the candidates if it is earlier than the planned one.
   [[gnu::always_inline]] void plan_first(const ScanTask& task, const ScanResult& first) {
     if (flights_.has_steps()) [[unlikely]]
