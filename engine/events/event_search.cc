@@ -86,12 +86,10 @@ void EventSearch<D>::choose(double now) {
 /// The spheres in octaves of reach.
 template <int D>
 std::vector<SearchSituation::SizeClass> EventSearch<D>::size_classes() const {
-  constexpr int kOctaves = 31;
-  std::vector<SearchSituation::SizeClass> classes(kOctaves);
+  std::vector<SearchSituation::SizeClass> classes(SkinLists<D>::kOctaves);
   for (Slot i = 0; i < flights_.size(); ++i) {
     const double reach = reaches_[i];
-    SearchSituation::SizeClass& of =
-        classes[reach > 0 ? std::clamp(std::ilogb(largest_ / reach), 0, kOctaves - 1) : kOctaves - 1];
+    SearchSituation::SizeClass& of = classes[SkinLists<D>::octave(largest_, reach)];
     ++of.number;
     of.mean += (2 * reach - of.mean) / of.number;
     of.largest = std::max(of.largest, 2 * reach);
@@ -257,12 +255,6 @@ void EventSearch<D>::foresee_update(Slot i, double now) {
     predict_leaving(queue_[i], flights_[i], flights_, FlowFrame(), larges_->skin(), now);
   else
     predict_crossing(queue_[i], i, flights_, box_, *cells_, now);
-}
-
-/// The distance that a sphere may be from the centre of its list's region.
-template <int D>
-double EventSearch<D>::distance_left(Slot i) const {
-  return lists_->skin() - (!at_border_.empty() && at_border_[i] != 0 ? max_displacement_ : 0);
 }
 
 template <int D>

@@ -79,8 +79,7 @@ class EventSearch {
   void foresee_update(Slot i, double now);
   /// foresee_update() with lists.
   [[gnu::always_inline]] void foresee_leaving(Slot i, double now) {
-    const double left = lists_->skin() - (!at_border_.empty() && at_border_[i] != 0 ? max_displacement_ : 0);
-    predict_leaving(queue_[i], flights_[i], flights_, lists_->flow(), left, now);
+    predict_leaving(queue_[i], flights_[i], flights_, lists_->flow(), distance_left(i), now);
   }
   ScanTask listed(Slot i) const;
   void scan(const ScanTask& task, bool latest);
@@ -105,7 +104,10 @@ class EventSearch {
   [[gnu::noinline]] void offer_all(const ScanTask& task);  // seldom needed, and large
   [[gnu::noinline]] void cross(Slot i, double now);
   [[gnu::noinline]] void renew_list(Slot i, double now);
-  double distance_left(Slot i) const;
+  /// The distance that a sphere may be from the centre of its list's region.
+  double distance_left(Slot i) const {
+    return lists_->skin() - (!at_border_.empty() && at_border_[i] != 0 ? max_displacement_ : 0);
+  }
   /// The place of a sphere as the lists take it.
   Vec<D> place(Slot i, double now) const {
     const Vec<D> x = flights_.at(i, now).x;

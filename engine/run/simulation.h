@@ -108,8 +108,8 @@ struct StepReadings {
 
 /// The numbers of a Snapshot that runs in a sheared box have in addition.
 struct ShearReadings {
-  /// −P_xy since the last thermo row, from the work of the flow; NaN in a sheared box whose flow rests or turns, 0 in
-  /// others [energy/length^D].
+  /// −P_xy since the last thermo row, from the work of the flow; NaN in a sheared box while the flow rests or turns, 0
+  /// in others [energy/length^D].
   double shear_stress = 0;
 };
 

@@ -5,10 +5,10 @@
 // A cell as large as the largest sphere would hold many small ones. So only small spheres are in linked cells, which
 // are as large as the largest of them. The cells are combined into blocks. A large sphere has a region instead of a
 // cell: all blocks in which a small sphere may touch it, while it is within `skin` of the place where the region was
-// made. It has a list of the small spheres in its region, and each block has a list of the large spheres whose regions
-// hold it. When a small sphere moves into another block, it finds the large spheres that are new there, and the lists
-// of large spheres are corrected. Two large spheres can touch only where their regions overlap; each is then on the
-// list of the other.
+// made. It has a list of the small spheres in its region, and each block has a list of the large spheres with
+// regions that hold it. When a small sphere moves into another block, it finds the large spheres that are new there,
+// and the lists of large spheres are corrected. Two large spheres can touch only where their regions overlap; each is
+// then on the list of the other.
 //
 // Other programs have a grid for each octave of radii (Ogarko, Luding, Comput. Phys. Commun. 183 (2012) 931). Then each
 // small sphere searches the large cells around it after each collision, and a large one all small cells in them.
@@ -24,7 +24,7 @@ namespace carom {
 template <int D>
 class LargeSpheres {
  public:
-  /// `cells` hold the small spheres, whose reaches (Sizes) are at most `small`; all arguments must outlive this.
+  /// `cells` hold the small spheres, those with reaches (Sizes) of at most `small`; all arguments must outlive this.
   LargeSpheres(const LinkedCells<D>& cells, const Packing<D>& packing, std::span<const double> reach, double small,
                double skin, PageVector<NextEvent<D>>& next_events);
 
@@ -111,7 +111,8 @@ class LargeSpheres {
   std::array<std::size_t, D> blocks_;  // along each axis
   std::vector<std::uint32_t> number_;  // by slot: the index in large_, or kSmall
   std::vector<Large> large_;
-  // By block: the large spheres whose regions hold it, with the box of the block as seen from the box of their centre.
+  // By block: the large spheres with regions that hold it, and the box of the block as seen from the box of their
+  // centre.
   std::vector<std::vector<std::uint32_t>> listed_;
   std::int32_t widest_ = 0;  // the farthest box that a region has reached
   std::vector<std::uint32_t> found_;

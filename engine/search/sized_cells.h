@@ -22,14 +22,14 @@ class SizedCells {
   /// has the bounds of the positions, which matter along open axes. The cells are empty at first.
   SizedCells(const Box<D>& box, std::span<const double> reach, const Extent<D>& extent, double skin = 0)
       : skin_(skin), largest_(reach.empty() ? 0 : *std::ranges::max_element(reach)), places_(reach.size()) {
-    std::array<std::size_t, kOctaves> members{};
-    std::array<double, kOctaves> largest{};
+    std::array<std::size_t, kLevels> members{};
+    std::array<double, kLevels> largest{};
     for (const double r : reach) {
       const std::size_t o = octave(r);
       ++members[o];
       largest[o] = std::max(largest[o], r);
     }
-    for (std::size_t o = 0; o < kOctaves; ++o) {
+    for (std::size_t o = 0; o < kLevels; ++o) {
       level_[o] = levels_.size();
       if (members[o] > 0)
         levels_.emplace_back(largest[o],
@@ -63,7 +63,7 @@ class SizedCells {
   }
 
  private:
-  static constexpr std::size_t kOctaves = 8;  // the last one holds all smaller particles
+  static constexpr std::size_t kLevels = 8;  // the last one holds all smaller particles
   static constexpr std::uint32_t kNoParticle = std::numeric_limits<std::uint32_t>::max();
 
   struct Level {
@@ -79,13 +79,13 @@ class SizedCells {
 
   std::size_t octave(double reach) const {
     if (reach > 0.5 * largest_) return 0;
-    return reach > 0 ? std::min(static_cast<std::size_t>(std::ilogb(largest_ / reach)), kOctaves - 1) : kOctaves - 1;
+    return reach > 0 ? std::min(static_cast<std::size_t>(std::ilogb(largest_ / reach)), kLevels - 1) : kLevels - 1;
   }
 
   double skin_, largest_;
   std::vector<Level> levels_;
-  std::array<std::size_t, kOctaves> level_;  // by octave
-  std::vector<Place> places_;                // by particle
+  std::array<std::size_t, kLevels> level_;  // by octave
+  std::vector<Place> places_;               // by particle
 };
 
 }  // namespace carom

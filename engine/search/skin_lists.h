@@ -33,6 +33,11 @@ class SkinLists {
             std::span<const double> reach, bool equal, double largest, double skin,
             PageVector<NextEvent<D>>& next_events);
 
+  /// The octave of sizes to which a sphere belongs, 0 for the largest ones, kOctaves − 1 for all smaller ones and
+  /// points.
+  static std::uint8_t octave(double largest, double reach);
+  static constexpr int kOctaves = 31;
+
   double skin() const { return skin_; }
   const FlowFrame& flow() const { return flow_; }
   /// Lists made from now on need not hold before this time, nor, if windows are repaired, before this much less strain.
@@ -75,8 +80,6 @@ class SkinLists {
     RegionCells<D> cells;
   };
 
-  static constexpr int kOctaves = 31;  // the last one holds all smaller spheres
-  static std::uint8_t octave(double largest, double reach);
   std::size_t level_of(Slot i) const { return equal_ ? 0 : level_[i]; }
   Vec<D> centre(Slot i) const {
     Vec<D> c;
