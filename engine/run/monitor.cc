@@ -60,6 +60,7 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
       frames_(plan.frame_interval),
       rows_(plan.thermo_interval),
       tail_(tail_of(system)) {
+  statistics.shear_rates = system.box.shear_rates;
   statistics.shear_rate = system.box.shear_rates.empty() ? system.box.shear_rate : 0;
   statistics.tail_energy = tail_.energy;
   statistics.tail_pressure = pressure_of(tail_.virial, system.box, system.box.time);

@@ -205,9 +205,10 @@ struct Statistics {
   static constexpr std::array mean_names = {"pressure",       "temperature",    "potential",
                                             "collision_rate", "mean_free_time", "mean_free_path"};
   Blocking series;
-  double shear_rate = 0;       ///< of the box, if it is constant [1/time]
-  double wall_seconds = 0;     ///< spent in the loop of run()
-  bool stopped_early = false;  ///< should_stop has ended it
+  double shear_rate = 0;                             ///< of the box, if it is constant [1/time]
+  std::vector<std::array<double, 2>> shear_rates{};  ///< Box::shear_rates
+  double wall_seconds = 0;                           ///< spent in the loop of run()
+  bool stopped_early = false;                        ///< should_stop has ended it
 
   /// The estimate of a column of `series`; nothing but NaN if there is no such column.
   Estimate estimate(std::size_t column) const {

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "io/deck/deck_source.h"
 #include "io/files/rank_account.h"
 #include "io/files/version.h"
 
@@ -90,8 +89,8 @@ std::string summary_text(const Deck& deck, const RunOutcome& outcome, const Stat
          s.steps > s.start_steps ? (s.end_time - s.start_time) / static_cast<double>(s.steps - s.start_steps) : 0.0},
         {"longest", s.longest_step},
         {"local_error", s.local_error}};
-  if (const auto& rates = deck.source->shear_rates; !rates.empty()) {
-    json["shear"] = {{"rates", rates}, {"work", c.shear.value()}};
+  if (!s.shear_rates.empty()) {
+    json["shear"] = {{"rates", s.shear_rates}, {"work", c.shear.value()}};
   } else if (s.shear_rate != 0) {
     const Estimate stress = s.shear_stress();
     Estimate viscosity = stress;
