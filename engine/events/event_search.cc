@@ -51,7 +51,7 @@ void EventSearch<D>::choose(double now) {
   }
   SearchSituation situation = situation_of<D>(box_, radii, extent);
   situation.largest = 2 * largest_;
-  if (!sizes_ && !flights_.equal() && !box_.sheared()) situation.classes = size_classes();
+  if (!flights_.equal() && !box_.sheared()) situation.classes = size_classes();
   tuning_.choose(situation, counts_);
   if (!tuning_.lists()) {
     cells_ =
@@ -83,18 +83,22 @@ void EventSearch<D>::choose(double now) {
       flights_.size(), [&](Slot i) { return place(i, now); }, extent, max_displacement_);
 }
 
-/// The spheres in octaves of reach.
+/// The spheres of the whole system in octaves of reach. A subdomain takes thermal speeds, because it may have no sphere
+/// of some size.
 template <int D>
 std::vector<SearchSituation::SizeClass> EventSearch<D>::size_classes() const {
   std::vector<SearchSituation::SizeClass> classes(SkinLists<D>::kOctaves);
-  for (Slot i = 0; i < flights_.size(); ++i) {
-    const double reach = reaches_[i];
+  const auto add = [&](double reach, double number, double speed_squared) {
+    if (number == 0) return;
     SearchSituation::SizeClass& of = classes[SkinLists<D>::octave(largest_, reach)];
-    ++of.number;
-    of.mean += (2 * reach - of.mean) / of.number;
+    of.number += number;
+    of.mean += (2 * reach - of.mean) * number / of.number;
     of.largest = std::max(of.largest, 2 * reach);
-    of.speed_squared += (flights_[i].v.squaredNorm() - of.speed_squared) / of.number;
-  }
+    of.speed_squared += (speed_squared - of.speed_squared) * number / of.number;
+  };
+  for (std::size_t k = 0; sizes_ && k < sizes_->radius.size(); ++k)
+    add(box_.steps.reach()(sizes_->radius[k]), sizes_->number.empty() ? 1 : sizes_->number[k], 1 / sizes_->mass[k]);
+  for (Slot i = 0; !sizes_ && i < flights_.size(); ++i) add(reaches_[i], 1, flights_[i].v.squaredNorm());
   return classes;
 }
 
@@ -259,12 +263,24 @@ void EventSearch<D>::foresee_update(Slot i, double now) {
 
 template <int D>
 void EventSearch<D>::look_again(Slot i, double now) {
-  if (larges_ && larges_->has(i))
-    renew_region(i, now);
+  if (larges_) [[unlikely]]
+    look_again_beside(i, now);
   else if (cells_)
     cross(i, now);
   else
     renew_list(i, now);
+}
+
+/// look_again() where there are large spheres beside the cells.
+template <int D>
+void EventSearch<D>::look_again_beside(Slot i, double now) {
+  if (larges_->has(i)) return renew_region(i, now);
+  const CellPlace<D>& place = queue_[i].where.cell;
+  const CellPlace<D> before = place;
+  cross(i, now);
+  if (!larges_->parts(before, place)) return;
+  scan_beside(larges_->pass(i, before, place), false);
+  queue_.schedule(i);
 }
 
 /// Renews the list of a sphere that is about to leave its region.
@@ -289,12 +305,10 @@ template <int D>
 void EventSearch<D>::cross(Slot i, double now) {
   ++counts_.crossings;
   NextEvent<D>& a = queue_[i];
-  const CellPlace<D> before = a.where.cell;
   cells_->cross(i, a.where.cell, a.face / 2, a.face % 2 == 1 ? 1 : -1);
   const ScanResult first = cells_->scan_ahead(setting_, i, a.where.cell, a.face, found_);
   predict_crossing(a, i, flights_, box_, *cells_, now);
   plan_found(i, first, found_);
-  if (larges_ && larges_->parts(before, a.where.cell)) scan_beside(larges_->pass(i, before, a.where.cell), false);
   queue_.schedule(i);
 }
 
@@ -306,12 +320,13 @@ void EventSearch<D>::admit(Slot i, double reach, double now) {
   }
   setting_ = flights_.setting();
   if (!at_border_.empty()) at_border_[i] = border_fits() ? 1 : 0;
-  if (lists_) {
+  if (larges_) larges_->admit(i, reaches_);
+  if (lists_)
     lists_->admit(i, place(i, now), reaches_);
-  } else {
-    queue_[i].where.cell = cells_->place(flights_.at(i, now).x);
-    cells_->admit(i, queue_[i].where.cell);
-  }
+  else if (larges_ && larges_->has(i))
+    larges_->renew(i, flights_.at(i, now).x);
+  else
+    enter_cell(i, now);
   plan(i, now);
 }
 
@@ -319,19 +334,37 @@ template <int D>
 void EventSearch<D>::dismiss(Slot i) {
   if (lists_)
     lists_->dismiss(i);
+  else if (larges_ && larges_->has(i))
+    larges_->dismiss(i);
   else
-    cells_->remove(i, queue_[i].where.cell);
+    leave_cell(i);
+}
+
+template <int D>
+void EventSearch<D>::enter_cell(Slot i, double now) {
+  CellPlace<D>& cell = queue_[i].where.cell;
+  cell = cells_->place(flights_.at(i, now).x);
+  cells_->admit(i, cell);
+  if (larges_) larges_->enter(i, cell);
+}
+
+template <int D>
+void EventSearch<D>::leave_cell(Slot i) {
+  const CellPlace<D>& cell = queue_[i].where.cell;
+  if (larges_) larges_->leave(i, cell);
+  cells_->remove(i, cell);
 }
 
 template <int D>
 void EventSearch<D>::move(Slot i, double now) {
   if (lists_) {
     lists_->move(i, place(i, now), distance_left(i), now);
+  } else if (larges_ && larges_->has(i)) {
+    const Vec<D> x = flights_.at(i, now).x;
+    if (!((x - larges_->centre(i)).norm() < larges_->skin() * (1 - 1e-6))) larges_->renew(i, x);
   } else {
-    CellPlace<D>& cell = queue_[i].where.cell;
-    cells_->remove(i, cell);
-    cell = cells_->place(flights_.at(i, now).x);
-    cells_->admit(i, cell);
+    leave_cell(i);
+    enter_cell(i, now);
   }
 }
 
@@ -355,16 +388,32 @@ void EventSearch<D>::set_border(std::span<const Slot> slots, double now) {
 template <int D>
 std::span<const std::uint32_t> EventSearch<D>::find_near(Slot i) {
   if (lists_) return lists_->find_near(i, max_displacement_);
-  cells_->find_near(queue_[i].where.cell, 2 * (largest_ + max_displacement_), near_);
+  const CellGrid<D>& grid = cells_->grid();
+  if (larges_ && larges_->has(i)) {
+    const Vec<D> x = larges_->centre(i), room = Vec<D>::Constant(larges_->range(i) + 2 * max_displacement_);
+    return find_between(grid.cell(x - room), grid.cell(x + room));
+  }
+  const double reach = larges_ ? std::max(tuning_.small(), 0.0) : largest_;
+  Cell<D> low, high;
+  for (int k = 0; k < D; ++k) {
+    const auto range = static_cast<std::int32_t>(std::ceil(2 * (reach + max_displacement_) / grid.edge(k)));
+    low[k] = queue_[i].where.cell.unwrapped[k] - range;
+    high[k] = queue_[i].where.cell.unwrapped[k] + range;
+  }
+  return find_between(low, high);
+}
+
+/// All spheres in the cells between two, and the large ones that they may touch.
+template <int D>
+std::span<const std::uint32_t> EventSearch<D>::find_between(const Cell<D>& low, const Cell<D>& high) {
+  cells_->find_between(low, high, near_);
+  if (larges_) larges_->find_between(low, high, near_);
   return near_;
 }
 
 template <int D>
 std::span<const std::uint32_t> EventSearch<D>::find_near_at_border(Slot i, const Vec<D>& low, const Vec<D>& high) {
-  if (!lists_) {
-    cells_->find_between(low, high, near_);
-    return near_;
-  }
+  if (!lists_) return find_between(cells_->grid().cell(low), cells_->grid().cell(high));
   if (distance_left(i) == lists_->skin()) return find_near(i);
   return {lists_->candidates(queue_[i]), queue_[i].count};
 }

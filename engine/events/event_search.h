@@ -77,6 +77,10 @@ class EventSearch {
   [[gnu::noinline]] void plan_two_in_cells(Slot i, Slot j, double now);
   [[gnu::noinline]] void foresee_lone_events(Slot i);
   void foresee_update(Slot i, double now);
+  void look_again_beside(Slot i, double now);
+  void enter_cell(Slot i, double now);
+  void leave_cell(Slot i);
+  std::span<const std::uint32_t> find_between(const Cell<D>& low, const Cell<D>& high);
   /// foresee_update() with lists.
   [[gnu::always_inline]] void foresee_leaving(Slot i, double now) {
     predict_leaving(queue_[i], flights_[i], flights_, lists_->flow(), distance_left(i), now);

@@ -8,42 +8,50 @@ namespace carom {
 template <int D>
 LargeSpheres<D>::LargeSpheres(const LinkedCells<D>& cells, const Packing<D>& packing, std::span<const double> reach,
                               double small, double skin, PageVector<NextEvent<D>>& next_events)
-    : cells_(cells),
-      packing_(packing),
-      reach_(reach),
-      small_(std::max(small, 0.0)),
-      skin_(skin),
-      next_events_(next_events),
-      number_(reach.size(), kSmall) {
+    : cells_(cells), packing_(packing), reach_(reach), small_(small), skin_(skin), next_events_(next_events) {
   std::size_t all = 1;
   for (int k = 0; k < D; ++k) {
     blocks_[k] = static_cast<std::size_t>((cells.grid().count(k) + kCellsOfBlock - 1) / kCellsOfBlock);
     all *= blocks_[k];
   }
-  listed_.resize(all);
-  for (Slot i = 0; i < reach.size(); ++i)
-    if (reach[i] > small) {
-      number_[i] = static_cast<std::uint32_t>(large_.size());
-      large_.emplace_back();
-      large_.back().high[0] = -1;  // no region yet
-    }
+  list_of_.resize(all);
+  for (Slot i = 0; i < reach.size(); ++i) admit(i, reach);
 }
 
-/// Calls visit(block, away, low, high) for each block of a region, with the box in which it is and its first and last
-/// cell, as seen from the box of the centre.
+template <int D>
+void LargeSpheres<D>::admit(Slot i, std::span<const double> reach) {
+  reach_ = reach;
+  number_.resize(std::max<std::size_t>(number_.size(), i + 1));
+  number_[i] = kSmall;
+  if (reach[i] <= small_) return;
+  if (unused_.empty()) {
+    unused_.push_back(static_cast<std::uint32_t>(large_.size()));
+    large_.emplace_back();
+  }
+  number_[i] = unused_.back();
+  unused_.pop_back();
+  large_[number_[i]].high[0] = large_[number_[i]].low[0] - 1;  // no region yet
+}
+
+template <int D>
+void LargeSpheres<D>::dismiss(Slot i) {
+  clear(i);
+  unused_.push_back(std::exchange(number_[i], kDismissed));
+}
+
+/// Calls visit(block, away, low, high) for each block between two unwrapped cells that is within `limit` of x, with the
+/// box in which it is and its first and last cell, as seen from the box that holds the origin.
 template <int D>
 template <class Visit>
-void LargeSpheres<D>::for_each_block(Slot i, Visit&& visit) const {
+void LargeSpheres<D>::for_each_block(const Cell<D>& from, const Cell<D>& to, const Vec<D>& x, double limit,
+                                     Visit&& visit) const {
   const CellGrid<D>& grid = cells_.grid();
-  const Large& own = large_[number_[i]];
-  const Vec<D> x = centre(i);
-  const double limit = range(i) * range(i);
   Image<D> away{};
   Cell<D> low, high;
   const auto along = [&](const auto& self, int axis, std::size_t before, double squared) -> void {
     const std::int32_t count = grid.count(axis);
     const bool periodic = grid.box().periodic(axis);
-    for (std::int32_t c = own.low[axis], end; c <= own.high[axis]; c = end) {
+    for (std::int32_t c = from[axis], end; c <= to[axis]; c = end) {
       away[axis] = grid.boxes(axis, c);
       const std::int32_t first = away[axis] * count, number = (c - first) / kCellsOfBlock;
       end = first + std::min((number + 1) * kCellsOfBlock, count);
@@ -52,7 +60,7 @@ void LargeSpheres<D>::for_each_block(Slot i, Visit&& visit) const {
       const double below = periodic || c > 0 ? grid.face(axis, c) - x[axis] : 0,
                    above = periodic || end < count ? x[axis] - grid.face(axis, end) : 0,
                    far = std::max({below, above, 0.0}), sum = squared + far * far;
-      if (sum > limit) continue;
+      if (sum > limit * limit) continue;
       const std::size_t at = before * blocks_[axis] + static_cast<std::size_t>(number);
       if (axis == D - 1)
         visit(at, away, low, high);
@@ -61,6 +69,13 @@ void LargeSpheres<D>::for_each_block(Slot i, Visit&& visit) const {
     }
   };
   along(along, 0, 0, 0);
+}
+/// for_each_block() for the region of a large sphere.
+template <int D>
+template <class Visit>
+void LargeSpheres<D>::for_each_block(Slot i, Visit&& visit) const {
+  const Large& own = large_[number_[i]];
+  for_each_block(own.low, own.high, centre(i), range(i), visit);
 }
 
 /// Puts a large sphere and the listed ones that may touch it, as seen from its box, on each other's lists, unless they
@@ -85,17 +100,25 @@ void LargeSpheres<D>::meet(Slot i, const Image<D>& away, std::span<const std::ui
   }
 }
 
+/// Takes a large sphere off all lists and empties its own.
 template <int D>
-void LargeSpheres<D>::renew(Slot i, const Vec<D>& x) {
+void LargeSpheres<D>::clear(Slot i) {
   Large& own = large_[number_[i]];
   for (const std::uint32_t other : own.list.all())
     if (const std::uint32_t number = number_[packing_.slot(other)]; number != kSmall)
       large_[number].list.drop(packing_.reversed(i, other));
   own.list.clear();
   for_each_block(i, [&](std::size_t at, const auto&...) {
-    std::erase_if(listed_[at], [&](std::uint32_t each) { return packing_.slot(each) == i; });
+    auto& listed = lists_[list_of_[at]];
+    std::erase_if(listed, [&](std::uint32_t each) { return packing_.slot(each) == i; });
+    if (listed.empty() && list_of_[at] != 0) unused_lists_.push_back(std::exchange(list_of_[at], 0));
   });
+}
 
+template <int D>
+void LargeSpheres<D>::renew(Slot i, const Vec<D>& x) {
+  clear(i);
+  Large& own = large_[number_[i]];
   for (int k = 0; k < D; ++k) next_events_[i].where.centre[k] = x[k];
   const CellGrid<D>& grid = cells_.grid();
   own.low = grid.cell(x - Vec<D>::Constant(range(i)));
@@ -114,8 +137,17 @@ void LargeSpheres<D>::renew(Slot i, const Vec<D>& x) {
       const Slot j = packing_.slot(each);
       add(own.list, packing_.reversed(j, seen(packing_.pack(i, packing_.linear(away)), next_events_[j].where.cell)));
     }
-    meet(i, away, listed_[at]);
-    listed_[at].push_back(packing_.pack(i, packing_.linear(away)));
+    if (list_of_[at] == 0) {
+      if (unused_lists_.empty()) {
+        unused_lists_.push_back(static_cast<std::uint32_t>(lists_.size()));
+        lists_.emplace_back();
+      }
+      list_of_[at] = unused_lists_.back();
+      unused_lists_.pop_back();
+    }
+    auto& listed = lists_[list_of_[at]];
+    meet(i, away, listed);
+    listed.push_back(packing_.pack(i, packing_.linear(away)));
   });
 }
 
@@ -133,15 +165,15 @@ std::uint32_t LargeSpheres<D>::seen(std::uint32_t listed, const CellPlace<D>& pl
 template <int D>
 ScanTask LargeSpheres<D>::around(Slot i, const CellPlace<D>& place) {
   around_.clear();
-  for (const std::uint32_t each : listed_[block(place)]) add(around_, seen(each, place));
+  for (const std::uint32_t each : listed(place)) add(around_, seen(each, place));
   return around_.task(i, packing_.pack(i, 0));
 }
 
 template <int D>
 ScanTask LargeSpheres<D>::pass(Slot i, const CellPlace<D>& from, const CellPlace<D>& to) {
   const auto only = [&](const CellPlace<D>& in, const CellPlace<D>& not_in, auto&& visit) {
-    const auto& others = listed_[block(not_in)];
-    for (const std::uint32_t each : listed_[block(in)]) {
+    const auto& others = listed(not_in);
+    for (const std::uint32_t each : listed(in)) {
       const std::uint32_t candidate = seen(each, in);
       if (std::ranges::none_of(others, [&](std::uint32_t other) { return seen(other, not_in) == candidate; }))
         visit(large_[number_[packing_.slot(each)]].list, candidate);
@@ -154,6 +186,36 @@ ScanTask LargeSpheres<D>::pass(Slot i, const CellPlace<D>& from, const CellPlace
     add(around_, candidate);
   });
   return around_.task(i, packing_.pack(i, 0));
+}
+
+template <int D>
+void LargeSpheres<D>::enter(Slot i, const CellPlace<D>& place) {
+  for (const std::uint32_t each : listed(place))
+    add(large_[number_[packing_.slot(each)]].list, packing_.reversed(i, seen(each, place)));
+}
+
+template <int D>
+void LargeSpheres<D>::leave(Slot i, const CellPlace<D>& place) {
+  for (const std::uint32_t each : listed(place))
+    large_[number_[packing_.slot(each)]].list.drop(packing_.reversed(i, seen(each, place)));
+}
+
+template <int D>
+void LargeSpheres<D>::find_between(Cell<D> low, Cell<D> high, std::vector<std::uint32_t>& found) const {
+  for (int k = 0; k < D; ++k)
+    if (!cells_.grid().box().periodic(k)) {
+      low[k] = std::max(low[k], 0);
+      high[k] = std::min(high[k], cells_.grid().count(k) - 1);
+    }
+  const auto first = static_cast<std::ptrdiff_t>(found.size());
+  CellPlace<D> place{};
+  for_each_block(low, high, Vec<D>::Zero(), std::numeric_limits<double>::infinity(),
+                 [&](std::size_t at, const Image<D>& away, const auto&...) {
+                   place.boxes = packing_.linear(away);
+                   for (const std::uint32_t each : lists_[list_of_[at]]) found.push_back(seen(each, place));
+                 });
+  std::sort(found.begin() + first, found.end());  // a region may have several of the blocks
+  found.erase(std::unique(found.begin() + first, found.end()), found.end());
 }
 
 template class LargeSpheres<2>;

@@ -13,6 +13,7 @@
 // Other programs have a grid for each octave of radii (Ogarko, Luding, Comput. Phys. Commun. 183 (2012) 931). Then each
 // small sphere searches the large cells around it after each collision, and a large one all small cells in them.
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -24,7 +25,8 @@ namespace carom {
 template <int D>
 class LargeSpheres {
  public:
-  /// `cells` hold the small spheres, those with reaches (Sizes) of at most `small`; all arguments must outlive this.
+  /// `cells` hold the small spheres, those with reaches (Sizes) of at most `small`; all arguments must outlive this,
+  /// `reach` until admit() gets another one.
   LargeSpheres(const LinkedCells<D>& cells, const Packing<D>& packing, std::span<const double> reach, double small,
                double skin, PageVector<NextEvent<D>>& next_events);
 
@@ -42,6 +44,22 @@ class LargeSpheres {
   /// there, as input of the kernels; valid until the next call.
   ScanTask pass(Slot i, const CellPlace<D>& from, const CellPlace<D>& to);
 
+  /// A slot gets a sphere; `reach` as in the constructor. Call renew() for a large one, enter() for a small one.
+  void admit(Slot i, std::span<const double> reach);
+  /// Removes a large sphere.
+  void dismiss(Slot i);
+  /// A small sphere appears in a place, or disappears there: corrects the lists of the large ones.
+  void enter(Slot i, const CellPlace<D>& place);
+  void leave(Slot i, const CellPlace<D>& place);
+
+  /// The distance from the centre of its region within which a large sphere may touch a small one, or meets the region
+  /// of another large one.
+  double range(Slot i) const { return (reach_[i] + std::max(small_, 0.0) + skin_) * (1 + 1e-9); }
+  Vec<D> centre(Slot i) const { return Eigen::Map<const Vec<D>>(next_events_[i].where.centre); }
+  /// Appends all large spheres with regions that meet the cells between two unwrapped cells, as LinkedCells sees small
+  /// ones there.
+  void find_between(Cell<D> low, Cell<D> high, std::vector<std::uint32_t>& found) const;
+
   /// All large spheres that a small one in this place may touch, as input of the kernels; valid until the next call.
   ScanTask around(Slot i, const CellPlace<D>& place);
   /// All spheres that a large one may touch, as input of the kernels; valid until the next call.
@@ -49,6 +67,7 @@ class LargeSpheres {
 
  private:
   static constexpr std::uint32_t kSmall = 0xffffffff;
+  static constexpr std::uint32_t kDismissed = 0xfffffffe;  // it was large, so its slot has no cell
   /// Along each axis. With larger blocks regions hold more small spheres, with smaller ones there are more lists.
   static constexpr int kCellsOfBlock = 2;
 
@@ -95,10 +114,12 @@ class LargeSpheres {
     for (int k = 0; k < D; ++k) at = at * blocks_[k] + place.wrapped[k] / kCellsOfBlock;
     return at;
   }
+  const std::vector<std::uint32_t>& listed(const CellPlace<D>& place) const { return lists_[list_of_[block(place)]]; }
+  template <class Visit>
+  void for_each_block(const Cell<D>& low, const Cell<D>& high, const Vec<D>& x, double limit, Visit&& visit) const;
   template <class Visit>
   void for_each_block(Slot i, Visit&& visit) const;
-  Vec<D> centre(Slot i) const { return Eigen::Map<const Vec<D>>(next_events_[i].where.centre); }
-  double range(Slot i) const { return (reach_[i] + small_ + skin_) * (1 + 1e-9); }
+  void clear(Slot i);
   std::uint32_t seen(std::uint32_t listed, const CellPlace<D>& place) const;
   void add(List& list, std::uint32_t candidate) const { list.add(candidate, packing_.linear(candidate) == 0); }
   void meet(Slot i, const Image<D>& away, std::span<const std::uint32_t> listed);
@@ -106,14 +127,17 @@ class LargeSpheres {
   const LinkedCells<D>& cells_;
   const Packing<D>& packing_;
   std::span<const double> reach_;
-  double small_, skin_;
+  double small_, skin_;  // negative: all spheres are large
   PageVector<NextEvent<D>>& next_events_;
   std::array<std::size_t, D> blocks_;  // along each axis
-  std::vector<std::uint32_t> number_;  // by slot: the index in large_, or kSmall
+  std::vector<std::uint32_t> number_;  // by slot: the index in large_, kSmall or kDismissed
   std::vector<Large> large_;
-  // By block: the large spheres with regions that hold it, and the box of the block as seen from the box of their
-  // centre.
-  std::vector<std::vector<std::uint32_t>> listed_;
+  std::vector<std::uint32_t> unused_;  // indices in large_
+  // The large spheres with regions that hold a block, and the box of the block as seen from the box of their centre.
+  // Most blocks are in no region: theirs is the first list, which is empty.
+  std::vector<std::uint32_t> list_of_;  // by block
+  std::vector<std::vector<std::uint32_t>> lists_{1};
+  std::vector<std::uint32_t> unused_lists_;
   std::int32_t widest_ = 0;  // the farthest box that a region has reached
   std::vector<std::uint32_t> found_;
   List around_;

@@ -133,24 +133,10 @@ class LinkedCells {
     insert(i, place);
   }
 
-  /// Finds all spheres in the cells that may hold positions within `reach` of the sphere's cell, the sphere included.
-  void find_near(const Place& place, double reach, std::vector<std::uint32_t>& found) const {
-    found.clear();
-    Cell<D> low, high;
-    for (int k = 0; k < D; ++k) {
-      const auto range = static_cast<std::int32_t>(std::ceil(reach / grid_.edge(k)));
-      low[k] = place.unwrapped[k] - range;
-      high[k] = place.unwrapped[k] + range;
-    }
-    collect(low, high, found);
-  }
-  /// Finds all spheres in the cells between two cells or positions, as seen from the box that holds the origin.
+  /// Finds all spheres in the cells between two unwrapped cells, as seen from the box that holds the origin.
   void find_between(const Cell<D>& low, const Cell<D>& high, std::vector<std::uint32_t>& found) const {
     found.clear();
     collect(low, high, found);
-  }
-  void find_between(const Vec<D>& low, const Vec<D>& high, std::vector<std::uint32_t>& found) const {
-    find_between(grid_.cell(low), grid_.cell(high), found);
   }
 
   /// Finds all spheres in the sphere's cell and in the cells around it, and the first contact with them. `latest` as in

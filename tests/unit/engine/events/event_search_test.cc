@@ -13,13 +13,13 @@ namespace {
 template <int D>
 struct Searched {
   /// `elsewhere`: spheres of the system that this search does not have.
-  Searched(std::unique_ptr<System<D>> spheres, const Vec<D>& g, SearchOptions::Method method, double displacement = 0.1,
+  Searched(std::unique_ptr<System<D>> spheres, const Vec<D>& g, const SearchOptions& options, double displacement = 0.1,
            std::size_t elsewhere = 0)
       : system(std::move(spheres)),
         sizes(system->particles),
         flights(system->box),
         queue(flights),
-        search(system->box, flights, queue, &sizes, {.method = method}) {
+        search(system->box, flights, queue, &sizes, options) {
     sizes.spheres += elsewhere;
     std::vector<Record<D>> records;
     const Particles<D>& p = system->particles;
@@ -88,7 +88,12 @@ struct Searched {
   mutable int planned = 0;  // contacts that expect_planned() found
 };
 
-constexpr auto kMethods = {SearchOptions::Method::lists, SearchOptions::Method::cells};
+constexpr SearchOptions kLists{.method = SearchOptions::Method::lists}, kCells{.method = SearchOptions::Method::cells};
+constexpr auto kMethods = {kLists, kCells};
+/// For spheres with radii from 0.2 to 0.5.
+constexpr auto kMethodsOfMixtures = {
+    kLists, kCells, SearchOptions{.method = SearchOptions::Method::small_cells, .skin = 0.2, .cell = 0.6, .small = 0.3},
+    SearchOptions{.method = SearchOptions::Method::small_cells, .skin = 0.7, .cell = 0.9, .small = 0.45}};
 
 /// Executes the queue up to the first contact: before it only neighbourhoods change.
 template <int D>
@@ -109,7 +114,7 @@ void expect_nothing_missed(Searched<D>& s) {
 TEST(EventSearch, RegionsFollowSpheresThatWereWrapped) {
   auto spheres = random_system<3>(300, {9, 10, 11}, {P, P, P}, 0.4, 0.4, 5);
   for (Vec<3>& v : spheres->particles.v) v *= 0.05;  // they stay in their regions
-  Searched<3> s(std::move(spheres), Vec<3>::Zero(), SearchOptions::Method::lists);
+  Searched<3> s(std::move(spheres), Vec<3>::Zero(), kLists);
   std::vector<Vec<3>> centre, shift;
   const auto centre_of = [&](Slot i) {
     return Vec<3>(s.queue[i].where.centre[0], s.queue[i].where.centre[1], s.queue[i].where.centre[2]);
@@ -133,7 +138,7 @@ TEST(EventSearch, RegionsFollowSpheresThatWereWrapped) {
 }
 
 TEST(EventSearch, PlansTheContactsThatTryingEverythingFinds) {
-  for (const auto method : kMethods) {
+  for (const auto& method : kMethods) {
     Searched<2> flat(random_system<2>(40, {9, 9}, {P, P}, 0.2, 0.5, 1), Vec<2>::Zero(), method);
     expect_nothing_missed(flat);
     Searched<3> walled(random_system<3>(60, {6, 5, 6}, {P, W, P}, 0.3, 0.5, 2), Vec<3>::Zero(), method);
@@ -184,7 +189,7 @@ void expect_contacts(Searched<D>& s, int contacts) {
 }
 
 TEST(EventSearch, PlansAnewAfterContacts) {
-  for (const auto method : kMethods) {
+  for (const auto& method : kMethods) {
     Searched<2> flat(random_system<2>(30, {9, 7}, {P, P}, 0.3, 0.5, 6), Vec<2>::Zero(), method);
     expect_contacts(flat, 30);
     Searched<2> equal(random_system<2>(30, {9, 7}, {P, P}, 0.4, 0.4, 7), Vec<2>::Zero(), method);
@@ -197,7 +202,7 @@ TEST(EventSearch, PlansAnewAfterContacts) {
 }
 
 TEST(EventSearch, PlansContactsInAShearedBox) {
-  const auto lists = SearchOptions::Method::automatic;
+  const SearchOptions lists;
   for (const double rate : {0.7, -1.3}) {
     Searched<2> flat(sheared(random_system<2>(40, {9, 9}, {P, P}, 0.2, 0.5, 1), rate), Vec<2>::Zero(), lists);
     expect_nothing_missed(flat);
@@ -215,7 +220,7 @@ TEST(EventSearch, PlansContactsInAShearedBox) {
 /// Only cells near the spheres are stored, up to three beyond them, and spheres come to the outermost ones. With nine
 /// parts, rows of cells have too many patterns, and all cells are stored.
 TEST(EventSearch, FindsContactsInScatteredParts) {
-  for (const auto method : kMethods)
+  for (const auto& method : kMethods)
     for (const int parts : {2, 9}) {
       auto system = random_system<3>(100, {18, 5, 5}, {P, P, P}, 0.5, 0.5, 12);
       system->box.edges[0] = 150;
@@ -245,8 +250,8 @@ TEST(EventSearch, FindsContactsInScatteredParts) {
 }
 
 TEST(EventSearch, KnowsSpheresThatComeMoveAndGo) {
-  for (const auto method : kMethods) {
-    Searched<3> s(random_system<3>(80, {6, 6, 6}, {P, P, P}, 0.5, 0.5, 4), Vec<3>::Zero(), method);
+  for (const auto& method : kMethodsOfMixtures) {
+    Searched<3> s(random_system<3>(120, {6, 6, 6}, {P, P, P}, 0.2, 0.5, 4), Vec<3>::Zero(), method);
     const double now = s.kStart;
     const auto plan_all = [&] {
       for (Slot i = 0; i < s.flights.size(); ++i) {
@@ -262,23 +267,28 @@ TEST(EventSearch, KnowsSpheresThatComeMoveAndGo) {
       s.search.move(i, now);
     }
     plan_all();
-    s.search.dismiss(7);
-    s.dismissed = 7;
-    plan_all();
-    s.dismissed = kEmpty;
-    s.queue.admit(7);
-    s.search.admit(7, 0.5, now);
-    s.expect_planned(7);
-    plan_all();
+    const auto reaches = s.flights.reaches(0);
+    const auto [least, most] = std::ranges::minmax_element(reaches);
+    for (const auto& extreme : {least, most}) {
+      const auto i = static_cast<Slot>(extreme - reaches.begin());
+      s.search.dismiss(i);
+      s.dismissed = i;
+      plan_all();
+      s.dismissed = kEmpty;
+      s.queue.admit(i);
+      s.search.admit(i, reaches[i], now);
+      s.expect_planned(i);
+      plan_all();
+    }
     EXPECT_GT(s.planned, 40);
     expect_contacts(s, 60);
   }
 }
 
 TEST(EventSearch, FindsAllThatASphereMayTouchInAWindow) {
-  for (const auto method : kMethods)
+  for (const auto& method : kMethodsOfMixtures)
     for (const double displacement : {0.1, 1.0}) {
-      Searched<3> s(random_system<3>(120, {7, 6, 5}, {P, P, W}, 0.3, 0.5, 5), Vec<3>::Zero(), method, displacement);
+      Searched<3> s(random_system<3>(120, {7, 6, 5}, {P, P, W}, 0.2, 0.5, 5), Vec<3>::Zero(), method, displacement);
       std::size_t found = 0;
       for (Slot i = 0; i < s.flights.size(); ++i) {
         const auto near = s.search.find_near(i);

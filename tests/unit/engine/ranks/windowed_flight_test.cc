@@ -18,6 +18,7 @@ struct Way {
   int subdomains = 1;
   SearchOptions::Method method = SearchOptions::Method::automatic;
   double in_cache = SearchOptions{}.in_cache;
+  double skin = 0, cell = 0, small = 0;  // as in SearchOptions
   std::function<double()> window{};
   std::uint64_t limit = std::numeric_limits<std::uint64_t>::max();
   std::uint64_t contacts = std::numeric_limits<std::uint64_t>::max();  ///< of a slab
@@ -55,8 +56,10 @@ Outcome<D> divided(const Case<D>& c, const Way& way, Counters* counted = nullptr
     system.particles = c.system->particles;
     system.decomposition.join(ranks);
     Particles<D>& p = system.particles;
-    WindowedFlight<D> flight(system.box, system.decomposition.sizes(), ranks,
-                             {.method = way.method, .in_cache = way.in_cache}, way.window);
+    WindowedFlight<D> flight(
+        system.box, system.decomposition.sizes(), ranks,
+        {.method = way.method, .skin = way.skin, .cell = way.cell, .small = way.small, .in_cache = way.in_cache},
+        way.window);
     Counters counters;
     std::vector<Contact<D>> contacts;
     for (int k = 0; k < c.slabs && counters.sphere_sphere < way.limit; ++k) {
@@ -119,6 +122,38 @@ TEST(WindowedFlight, ManySizes) {
       {.system = random_system<3>(300, {7, 7, 7}, {P, P, P}, 0.1, 1.0, 3), .slab = 0.05, .slabs = 2}, 700);
   expect_the_same_however_divided<2>(
       {.system = random_system<2>(120, {21, 21}, {P, W}, 0.15, 1.5, 4), .slab = 0.3, .slabs = 2}, 200);
+}
+
+/// Spheres up to some size in cells, larger ones beside them, which change subdomains and are ghosts like small ones.
+TEST(WindowedFlight, LargeSpheresBesideCells) {
+  const auto expect_the_same = [](const auto& c, std::size_t at_least) {
+    const auto reference = whole(c);
+    ASSERT_GE(reference.contacts.size(), at_least);
+    const auto [least, most] = std::ranges::minmax(c.system->particles.radius);
+    for (const int subdomains : {2, 3, 8})
+      for (const double share : {-1.0, 0.2, 0.8})
+        for (const double skin : {0.1, 1.0}) {
+          const double small = least + share * (most - least);
+          const auto found = divided(c, {.subdomains = subdomains,
+                                         .method = SearchOptions::Method::small_cells,
+                                         .in_cache = subdomains == 2 ? 0 : SearchOptions{}.in_cache,
+                                         .skin = skin * most,
+                                         .cell = 0.5 * most,
+                                         .small = small});
+          expect_same(
+              reference, found,
+              std::to_string(subdomains) + " up to " + std::to_string(small) + ", skin " + std::to_string(skin));
+        }
+  };
+  expect_the_same(Case<3>{.system = random_system<3>(300, {9, 7, 7}, {P, P, P}, 0.1, 1.0, 3), .slab = 0.2, .slabs = 2},
+                  1000);
+  expect_the_same(Case<3>{.system = random_system<3>(300, {9, 8, 8}, {P, W, P}, 0.1, 1.0, 4),
+                          .g = {0.2, -1, 0},
+                          .slab = 0.2,
+                          .slabs = 2},
+                  1000);
+  expect_the_same(Case<2>{.system = random_system<2>(120, {21, 21}, {P, W}, 0.15, 1.5, 4), .slab = 0.5, .slabs = 3},
+                  300);
 }
 
 /// In a box of 10⁷ diameters contacts are rounded to 1e-9 of a diameter, between spheres and at a wall: the longest
