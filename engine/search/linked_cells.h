@@ -136,7 +136,7 @@ class LinkedCells {
   /// Finds all spheres in the cells between two unwrapped cells, as seen from the box that holds the origin.
   void find_between(const Cell<D>& low, const Cell<D>& high, std::vector<std::uint32_t>& found) const {
     found.clear();
-    collect(low, high, found);
+    collect(low, high, {}, found);
   }
 
   /// Finds all spheres in the sphere's cell and in the cells around it, and the first contact with them. `latest` as in
@@ -373,36 +373,45 @@ class LinkedCells {
     return search(setting, self, place, latest, found);
   }
 
-  /// Appends all spheres in the cells between two corners; `at` and `away` are the sums over the axes before `axis`.
-  void collect(const Cell<D>& low, const Cell<D>& high, std::vector<std::uint32_t>& found, int axis = 0,
-               std::ptrdiff_t at = 1, std::int32_t away = 0) const {
+  /// Appends all spheres in the cells between two corners; `at` and `seen`, the box, are of the axes before `axis`.
+  void collect(const Cell<D>& low, const Cell<D>& high, Image<D> seen, std::vector<std::uint32_t>& found, int axis = 0,
+               std::ptrdiff_t at = 1) const {
     const std::int32_t count = grid_.count(axis);
     const std::int32_t first = periodic_[axis] ? low[axis] : std::max(low[axis], 0);
     const std::int32_t last = periodic_[axis] ? high[axis] : std::min(high[axis], count - 1);
     for (std::int32_t c = first; c <= last; ++c) {
-      const std::int32_t boxes = grid_.boxes(axis, c), seen = away + boxes * one_[axis];
-      const std::int32_t wrapped = c - boxes * count;
+      seen[axis] = grid_.boxes(axis, c);
+      const std::int32_t wrapped = c - seen[axis] * count;
       const std::ptrdiff_t cell = at + (axis < D - 1 ? (steps_[axis].data() + wrapped + 1)->offset : wrapped);
       if (axis < D - 1) {
-        collect(low, high, found, axis + 1, cell, seen);
+        collect(low, high, seen, found, axis + 1, cell);
         continue;
       }
       std::uint32_t next = first_[static_cast<std::size_t>(cell)];
       while (next != kEmpty) {
         const Slot j = packing_.slot(next & ~kMoreInCell);
-        found.push_back(packing_.pack(j, link_[j].boxes - seen));
+        if (2 * widest_ + 1 > packing_.largest()) [[unlikely]] {
+          const Image<D> theirs = packing_.image(packing_.pack(0, link_[j].boxes));
+          for (int k = 0; k < D; ++k)
+            if (std::abs(theirs[k] - seen[k]) > packing_.largest()) throw_too_far();
+        }
+        found.push_back(packing_.pack(j, link_[j].boxes - packing_.linear(seen)));
         next = (next & kMoreInCell) != 0 ? link_[j].next : kEmpty;
       }
     }
   }
 
-  /// Checks every candidate, because spheres have moved so many boxes that a difference of images may overflow.
+  /// Checks every candidate, because spheres have moved so many boxes that a difference of images may overflow. The
+  /// image differs from that of the two boxes by at most 1, for a pair seen through a face. An overflow of the bits of
+  /// one axis, which changes the next axis too, would make it differ by more, or give the one value in these bits that
+  /// is beyond the largest.
   [[gnu::noinline]] void check(const Place& place, const Candidates& found) const {
     const Image<D> own = packing_.image(packing_.pack(0, place.boxes));
     for (unsigned q = 0; q < found.task.count; ++q) {
-      const Image<D> theirs = packing_.image(packing_.pack(0, link_[packing_.slot(found.packed[q])].boxes));
+      const Image<D> theirs = packing_.image(packing_.pack(0, link_[packing_.slot(found.packed[q])].boxes)),
+                     seen = packing_.image(found.packed[q]);
       for (int k = 0; k < D; ++k)
-        if (std::abs(theirs[k] - own[k]) + 1 > packing_.largest()) throw_too_far();  // 1: seen through a face
+        if (std::abs(seen[k]) > packing_.largest() || std::abs(theirs[k] - own[k] - seen[k]) > 1) throw_too_far();
     }
   }
 

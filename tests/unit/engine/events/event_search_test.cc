@@ -251,7 +251,7 @@ TEST(EventSearch, FindsContactsInScatteredParts) {
 
 TEST(EventSearch, KnowsSpheresThatComeMoveAndGo) {
   for (const auto& method : kMethodsOfMixtures) {
-    Searched<3> s(random_system<3>(120, {6, 6, 6}, {P, P, P}, 0.2, 0.5, 4), Vec<3>::Zero(), method);
+    Searched<3> s(random_system<3>(60, {4.8, 4.8, 4.8}, {P, P, P}, 0.2, 0.5, 4), Vec<3>::Zero(), method);
     const double now = s.kStart;
     const auto plan_all = [&] {
       for (Slot i = 0; i < s.flights.size(); ++i) {
@@ -288,7 +288,7 @@ TEST(EventSearch, KnowsSpheresThatComeMoveAndGo) {
 TEST(EventSearch, FindsAllThatASphereMayTouchInAWindow) {
   for (const auto& method : kMethodsOfMixtures)
     for (const double displacement : {0.1, 1.0}) {
-      Searched<3> s(random_system<3>(120, {7, 6, 5}, {P, P, W}, 0.2, 0.5, 5), Vec<3>::Zero(), method, displacement);
+      Searched<3> s(random_system<3>(70, {6, 5, 4}, {P, P, W}, 0.2, 0.5, 5), Vec<3>::Zero(), method, displacement);
       std::size_t found = 0;
       for (Slot i = 0; i < s.flights.size(); ++i) {
         const auto near = s.search.find_near(i);

@@ -224,6 +224,31 @@ TEST(WindowedFlight, SpheresFarFromTheirRegion) {
     }
 }
 
+/// Beside the number of one of several million spheres a candidate has two bits for each axis of its image. That is
+/// enough for spheres that pass through a face; what is farther away is an error.
+TEST(WindowedFlight, SpheresOfALargeSystemPassThroughFaces) {
+  const auto system = random_system<3>(150, {6, 6, 6}, {P, P, P}, 0.4, 0.4, 23);
+  const Particles<3>& p = system->particles;
+  Counters counters;
+  std::vector<Contact<3>> all;
+  EventCore<3> whole(system->box);
+  whole.load(p, Vec<3>::Zero(), 20);
+  whole.run(20, {.counters = counters, .contacts = &all});
+  Sizes sizes(p);
+  sizes.spheres = 5000000;  // as if there were more spheres elsewhere
+  for (const auto method : {SearchOptions::Method::lists, SearchOptions::Method::cells}) {
+    std::vector<Contact<3>> here;
+    EventCore<3> part(system->box, &sizes, {.method = method});
+    std::vector<Record<3>> records;
+    for (Id i = 0; i < p.size(); ++i) records.push_back({p.x[i], p.v[i], 0.0, i, 0, p.species[i]});
+    part.load(records, Vec<3>::Zero(), 20, 0, 0.5);
+    ASSERT_EQ(part.flights().packing().largest(), 1);
+    EXPECT_THROW(part.run(20, {.counters = counters, .contacts = &here}), Error);
+    ASSERT_GT(here.size(), 300u);
+    for (std::size_t k = 0; k < here.size(); ++k) ASSERT_TRUE(all[k].key == here[k].key) << "contact " << k;
+  }
+}
+
 TEST(WindowedFlight, WallsAndFields) {
   expect_the_same_however_divided<3>({.system = random_system<3>(150, {7, 6, 6}, {W, P, W}, 0.5, 0.5, 5), .slab = 1},
                                      1000);
