@@ -152,6 +152,8 @@ class Flights {
 
   /// The contact distance of two spheres at time 0; the radius of one [length].
   double contact_distance(Slot i, Slot j) const { return radius(i) + radius(j); }
+  /// The reach (Sizes) at the start of the slab.
+  double reach(Slot i) const { return box_.steps.reach()(radius(i)); }
   double radius(Slot i) const { return radius_.empty() ? common_radius_ : radius_[i]; }
   /// Whether all spheres have the same radius.
   bool equal() const { return common_radius_ != 0; }

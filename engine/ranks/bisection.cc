@@ -72,8 +72,8 @@ struct Bisection<D>::Piece {
 
 template <int D>
 Bisection<D>::Bisection(const Box<D>& box, std::span<const Vec<D>> x, std::size_t subdomains, double reach,
-                        Communicator& ranks, std::span<const std::uint32_t> work)
-    : box_(box), reach_(reach), parts_(std::max<std::size_t>(subdomains, 1)) {
+                        Communicator& ranks, std::span<const std::uint32_t> work, double largest)
+    : box_(box), reach_(reach), largest_(largest), parts_(std::max<std::size_t>(subdomains, 1)) {
   std::vector<Sphere> spheres(x.size());
   for (std::size_t i = 0; i < x.size(); ++i) spheres[i] = {wrapped(x[i]), work.empty() ? 1 : work[i]};
   Piece all{.part = {}, .first = 0, .subdomains = parts_.size(), .spheres = spheres};

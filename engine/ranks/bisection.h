@@ -19,13 +19,15 @@ template <int D>
 class Bisection {
  public:
   /// Divides the spheres of all ranks; this rank has the spheres at x. `work`: of each sphere (empty: all equal). A
-  /// position is near a subdomain if its distance is at most `reach`. Collective; the cuts do not depend on which rank
-  /// has which spheres.
+  /// position is near a subdomain if its distance is at most `reach`, that of a pair of the largest spheres, which have
+  /// the reach (Sizes) `largest`. Collective; the cuts do not depend on which rank has which spheres.
   Bisection(const Box<D>& box, std::span<const Vec<D>> x, std::size_t subdomains, double reach, Communicator& ranks,
-            std::span<const std::uint32_t> work = {});
+            std::span<const std::uint32_t> work = {}, double largest = 0);
 
   std::size_t subdomains() const { return parts_.size(); }
   double reach() const { return reach_; }
+  /// The distance from a subdomain at which a sphere with this reach can touch a largest sphere of the subdomain.
+  double reach_of(double sphere) const { return reach_ - (largest_ - sphere); }
   /// The other subdomains within reach of a subdomain.
   std::span<const std::uint32_t> neighbours(std::uint32_t subdomain) const { return neighbours_[subdomain]; }
 
@@ -40,18 +42,24 @@ class Bisection {
   /// Calls visit(subdomain) for all subdomains near a position, the one that contains it first.
   template <class Visit>
   void for_each_near(const Vec<D>& at, Visit&& visit) const {
+    for_each_near(at, reach_, visit);
+  }
+  /// for_each_near() with `reach` for "near", which is at most reach().
+  template <class Visit>
+  void for_each_near(const Vec<D>& at, double reach, Visit&& visit) const {
     const std::uint32_t own = owner(at);
     visit(own);
-    if (deep(depth(own, at))) return;
+    if (deep(depth(own, at), reach)) return;
     for (const std::uint32_t r : neighbours_[own])
-      if (near(r, at)) visit(r);
+      if (near(r, at, reach)) visit(r);
   }
   /// Whether a position is near a subdomain.
-  bool near(std::uint32_t subdomain, const Vec<D>& at) const {
-    return squared_distance(subdomain, at) <= reach_ * reach_;
+  bool near(std::uint32_t subdomain, const Vec<D>& at) const { return near(subdomain, at, reach_); }
+  bool near(std::uint32_t subdomain, const Vec<D>& at, double reach) const {
+    return squared_distance(subdomain, at) <= reach * reach;
   }
-  /// Whether a position with this depth is near no other subdomain, allowing for rounding.
-  bool deep(double depth) const { return depth > (1 + 1e-6) * reach_; }
+  /// Whether a position with this depth is farther than `reach` from every other subdomain, allowing for rounding.
+  static bool deep(double depth, double reach) { return depth > (1 + 1e-6) * reach; }
   /// The squared distance of a position from a subdomain.
   double squared_distance(std::uint32_t subdomain, const Vec<D>& at) const {
     return squared_distance(parts_[subdomain], parts_[subdomain].half, at, at, at);
@@ -105,7 +113,7 @@ class Bisection {
   std::vector<std::uint32_t> neighbours_of(std::uint32_t subdomain) const;
 
   Box<D> box_;
-  double reach_;
+  double reach_, largest_;
   std::vector<Part> parts_;
   std::vector<Cut> cuts_;
   std::vector<std::vector<std::uint32_t>> neighbours_;

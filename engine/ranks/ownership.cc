@@ -44,12 +44,12 @@ void Ownership<D>::watch(double now) {
   events_.clear();
   with_events_.resize(role_.size());
   watched_at_.assign(role_.size(), kUnwatched);
-  const double reach = bisection_.reach() + (kWindowsBetweenSearches + 1) * max_displacement_;
+  const double until_next = (kWindowsBetweenSearches + 1) * max_displacement_;
   for (Slot i = 0; i < core_.flights().size(); ++i) {
     if (is_ghost(i)) watch_over(i);
     if (!owns(i)) continue;
     const double depth = bisection_.depth(number_, bisection_.wrapped(core_.flights().at(i, now).x));
-    if (depth <= reach) watch_over(i, holders_[i] == 0 ? quiet_at(depth) : 0);
+    if (depth <= reach(i) + until_next) watch_over(i, holders_[i] == 0 ? quiet_at(depth, reach(i)) : 0);
   }
   core_.set_border(watched_, now);
 }
@@ -60,10 +60,10 @@ template <int D>
 double Ownership<D>::update_role(Slot i, double now) {
   const Flights<D>& flights = core_.flights();
   const Vec<D> at = bisection_.wrapped(flights.at(i, now).x);
-  const double depth = bisection_.depth(number_, at), reach = bisection_.reach();
+  const double depth = bisection_.depth(number_, at), reach = this->reach(i);
   role_[i] = Role::own;
   holders_[i] = 0;
-  if (bisection_.deep(depth)) return quiet_at(depth);
+  if (bisection_.deep(depth, reach)) return quiet_at(depth, reach);
   double quiet;
   if (depth > 0 || bisection_.owner(at) == number_) {
     quiet = depth;
@@ -119,7 +119,7 @@ bool Ownership<D>::meeting_place(const Record<D>& r, double end, Vec<D>& low, Ve
 
 template <int D>
 bool Ownership<D>::may_meet(const Record<D>& r, Slot j, const Offset<D>& offset, double end) const {
-  const double close = bisection_.reach() + way(r, end);
+  const double close = reach(j) + way(r, end);
   const Record<D>& other = core_.flights()[j];
   const double s = end - other.t;
   if (core_.flights().sheared()) {  // both at the end, because the flow carries them the same way

@@ -76,7 +76,9 @@ class Ownership {
     events_.push_back(Events::none);
   }
   /// How far an own sphere that is no ghost elsewhere can move before it may become one.
-  double quiet_at(double depth) const { return depth - (1 + 1e-6) * bisection_.reach(); }
+  static double quiet_at(double depth, double reach) { return depth - (1 + 1e-6) * reach; }
+  /// The distance from a subdomain at which a sphere is a ghost there.
+  double reach(Slot i) const { return bisection_.reach_of(core_.flights().reach(i)); }
   void enlist(Slot i, Role role) {
     slots_.add(core_.flights()[i].id, i);
     role_[i] = role;

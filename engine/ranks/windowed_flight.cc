@@ -33,9 +33,10 @@ void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double ho
   horizon_ = horizon;
   events_ = 0;
   length_.start(box_, sizes_, ranks_, particles, g, horizon);
+  const double largest = box_.steps.reach()(sizes_.largest_radius());
   const auto divide = [&](std::size_t subdomains) {
-    bisection_.emplace(box_, particles.x, subdomains,
-                       2 * (box_.steps.reach()(sizes_.largest_radius()) + length_.max_displacement()), ranks_, work_);
+    bisection_.emplace(box_, particles.x, subdomains, 2 * (largest + length_.max_displacement()), ranks_, work_,
+                       largest);
     for (std::uint32_t r = 0; r < subdomains; ++r)
       if (bisection_->neighbours(r).size() > kMaxNeighbours) return false;
     return true;
@@ -59,7 +60,8 @@ template <class Spheres>
 void WindowedFlight<D>::load(double now, Spheres&& spheres) {
   std::vector<Bytes> outgoing(static_cast<std::size_t>(ranks_.size()));
   spheres([&](const Vec<D>& x, const Record<D>& r, const Internal<D>& internal) {
-    bisection_->for_each_near(bisection_->wrapped(x),
+    const double reach = bisection_->reach_of(box_.steps.reach()(sizes_.radius_of(r)));
+    bisection_->for_each_near(bisection_->wrapped(x), reach,
                               [&](std::uint32_t rank) { subdomain_.put_sphere(outgoing[rank], r, internal); });
   });
   subdomain_.load(ranks_.swap(std::move(outgoing)), *bisection_, g_, horizon_, now, length_.max_displacement());

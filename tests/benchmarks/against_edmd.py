@@ -8,6 +8,11 @@ EDMD is a directory with its sources, whose version Single runs at packing fract
 author's flags, without thermostat and output, and with up to 200 cells along an axis instead of 75, and starts from a state that Carom has
 equilibrated. Both programs report the processor time of their event loops, for so many collisions (--collisions). The table has the
 medians, in thousand collisions per second, and the median of the ratios of pairs.
+
+    tests/benchmarks/against_edmd.py EDMD --sizes --spheres 10000 --filled 0.01 0.05 0.10 0.20 --collisions 100000
+
+--sizes: every thousandth sphere has ten times the diameter and the same mass, because EDMD knows no other, and EDMD runs in its version
+Cell. Carom's rate is that of a whole run, in real time.
 """
 
 import argparse
@@ -55,28 +60,43 @@ def main():
     parser.add_argument("--filled", type=float, nargs="+", default=[0.10, 0.30, 0.49], help="packing fractions")
     parser.add_argument("--collisions", type=int, default=1000000)
     parser.add_argument("--repeat", type=int, default=3)
+    parser.add_argument("--sizes", action="store_true", help="spheres of diameters 1 and 10")
     given = parser.parse_args()
     print("| packing fraction | spheres | Carom | EDMD | ratio |\n|---|---|---|---|---|")
     for filled in given.filled:
         for spheres in given.spheres:
             with tempfile.TemporaryDirectory() as name:
                 directory = pathlib.Path(name)
-                edmd_program(given.edmd, "Single" if filled >= 0.4 else "Cell", given.collisions, directory)
-                run_carom(given.bin / "io/carom", ROOT / "inputs/hard-sphere-fluid.toml", directory / "state",
-                          [f"particles.0.count={spheres}", f"placement.packing_fraction={filled}", f"run.collisions={40 * spheres}",
-                           "run.end_time=1e9", "output.frame_interval=1e9", "output.thermo_interval=1e9"])
+                edmd_program(given.edmd, "Single" if filled >= 0.4 and not given.sizes else "Cell", given.collisions, directory)
+                few = spheres // 1000 if given.sizes else 0
+                deck = ROOT / "inputs" / ("ten-to-one.toml" if given.sizes else "hard-sphere-fluid.toml")
+                counts = [f"particles.0.count={few}", f"particles.1.count={spheres}", "particles.0.mass=1.0"] if few else [
+                    f"particles.0.count={spheres}"]
+                quiet = ["run.end_time=1e9", "output.frame_interval=1e9", "output.thermo_interval=1e9"]
+
+                def run(collisions, into, set_=counts + [f"placement.packing_fraction={filled}"] + quiet, deck=deck):
+                    run_carom(given.bin / "io/carom", deck, into, set_ + [f"run.collisions={collisions}"])
+
+                run((2 if given.sizes else 40) * spheres, directory / "state")
                 with Trajectory(directory / "state") as state:
                     edges, position = state.edges(-1), state.position(-1)
-                rows = [f"{spheres}", " ".join(map(repr, map(float, edges)))]
-                rows += ["a " + " ".join(f"{each:.15g}" for each in x) + " 0.5" for x in position % edges]
+                unit = 10 if given.sizes else 1  # EDMD's unit of length is the largest diameter
+                rows = [f"{len(position)}", " ".join(repr(float(edge) / unit) for edge in edges)]
+                rows += ["a " + " ".join(f"{each:.15g}" for each in x / unit) + f" {0.5 if k < few else 0.5 / unit}"
+                         for k, x in enumerate(position % edges)]
                 (directory / "init.sph").write_text("\n".join(rows) + "\n")
                 pairs = []
-                for _ in range(given.repeat):
-                    subprocess.run([given.bin / "tests/benchmarks/carom_bench", "--n", str(spheres), "--packing-fraction", str(filled), "--repeat",
-                                    "1", "--collisions", str(given.collisions), "--json", directory / "bench.json"], check=True, capture_output=True)
-                    carom = json.loads((directory / "bench.json").read_text())
+                for k in range(given.repeat):
+                    if given.sizes:
+                        run(given.collisions, directory / str(k))
+                        rate = json.loads((directory / str(k) / "summary.json").read_text())["collisions_per_second"]
+                    else:
+                        subprocess.run([given.bin / "tests/benchmarks/carom_bench", "--n", str(spheres), "--packing-fraction", str(filled),
+                                        "--repeat", "1", "--collisions", str(given.collisions), "--json", directory / "bench.json"],
+                                       check=True, capture_output=True)
+                        rate = json.loads((directory / "bench.json").read_text())["points"][0]["collisions_per_second"]["median"]
                     text = subprocess.run(["./md"], cwd=directory, check=True, capture_output=True, text=True).stdout
-                    pairs.append((carom["points"][0]["collisions_per_second"]["median"], float(re.search(r"rate (\S+)", text).group(1))))
+                    pairs.append((rate, float(re.search(r"rate (\S+)", text).group(1))))
             rates = [statistics.median(each) / 1000 for each in zip(*pairs)]
             ratio = statistics.median(a / b for a, b in pairs)
             print(f"| {filled:.2f} | {spheres} | {rates[0]:.0f} | {rates[1]:.0f} | {ratio:.2f} |", flush=True)

@@ -18,8 +18,9 @@ struct Gas {
   double radius, mass, temperature;  ///< of the few; of the others 0.5, 1 and 1
 };
 
-constexpr std::array<Gas, 5> kGases = {{{"equal", 0, 0.5, 1, 1},
+constexpr std::array<Gas, 6> kGases = {{{"equal", 0, 0.5, 1, 1},
                                         {"sizes 1:10", 1.0 / 1001, 5, 1000, 1},  // half of the volume
+                                        {"1:10, 1 %", 0.01, 5, 1000, 1},
                                         {"masses 1:1e6", 0.5, 0.5, 1e6, 1},
                                         {"two of 1e10", 2, 0.5, 1e10, 1e10},
                                         {"one hot", 1.5, 0.5, 1, 1e6}}};

@@ -33,7 +33,8 @@ struct Divided {
   explicit Divided(std::unique_ptr<System<3>> spheres = fluid(), const Vec<3>& g = Vec<3>::Zero())
       : system(std::move(spheres)),
         sizes(system->particles),
-        bisection(system->box, system->particles.x, 2, 1 + 2 * kDisplacement, alone),
+        bisection(system->box, system->particles.x, 2, 2 * (sizes.largest_radius() + kDisplacement), alone, {},
+                  sizes.largest_radius()),
         whole(system->box, &sizes, {}) {
     const Particles<3>& p = system->particles;
     std::vector<Record<3>> records;
@@ -123,7 +124,8 @@ std::size_t expect_owners(const Divided& d, double time) {
       EXPECT_EQ(here.is_seen(here.slot_of(id)), ghost) << id;
       const Vec<3> x = d.bisection.wrapped(d.parts[k]->core.flights().at(here.slot_of(id), time).x);
       EXPECT_EQ(d.bisection.owner(x), static_cast<std::uint32_t>(k));
-      EXPECT_EQ(d.bisection.near(static_cast<std::uint32_t>(1 - k), x), ghost);
+      const double reach = d.system->particles.radius[id] + d.sizes.largest_radius() + 2 * kDisplacement;
+      EXPECT_EQ(d.bisection.squared_distance(static_cast<std::uint32_t>(1 - k), x) <= reach * reach, ghost) << id;
       ghosts += ghost ? 1 : 0;
     }
     EXPECT_EQ(owners, 1) << id;
@@ -136,6 +138,11 @@ TEST(Ownership, EverySphereHasOneOwnerWhichKnowsWhereItIsAGhost) {
   const std::size_t ghosts = expect_owners(d, 0);
   EXPECT_GT(ghosts, 50u);
   EXPECT_LT(ghosts, 280u);
+
+  // The nearest large sphere in the other subdomain is farther from a small ghost than from a large one.
+  const std::size_t of_sizes = expect_owners(Divided(random_system<3>(320, {14, 6, 6}, {P, P, P}, 0.1, 0.5, 11)), 0);
+  EXPECT_GT(of_sizes, 50u);
+  EXPECT_LT(of_sizes, ghosts - 20);
 }
 
 /// Spheres that start at rest change owners and become ghosts as soon as the field has moved them there.

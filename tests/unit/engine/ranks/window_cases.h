@@ -37,7 +37,8 @@ template <int D>
 void in_a_window(const System<D>& system, const Sizes& sizes, double end, auto&& check) {
   test::ThreadRanks(3).run([&](Communicator& ranks) {
     Communicator alone;
-    const Bisection<D> bisection(system.box, system.particles.x, 2, 1 + 2 * kDisplacement, alone);
+    const double largest = sizes.largest_radius();
+    const Bisection<D> bisection(system.box, system.particles.x, 2, 2 * (largest + kDisplacement), alone, {}, largest);
     const auto subdomain = subdomain_of(system, sizes, bisection, ranks, end);
     subdomain->run(0, end);
     const std::uint64_t rounds = subdomain->make_consistent([&](bool changed) {
