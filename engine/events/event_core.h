@@ -105,9 +105,11 @@ class EventCore {
   /// Candidates for contacts of a sphere: all spheres that may touch it if both are displaced by up to
   /// `max_displacement` (load). Valid until the next call.
   std::span<const std::uint32_t> find_near(Slot i) { return search_.find_near(i); }
-  /// find_near() for a sphere at the border, restricted to border spheres between two corners.
-  std::span<const std::uint32_t> find_near_at_border(Slot i, const Vec<D>& low, const Vec<D>& high) {
-    return search_.find_near_at_border(i, low, high);
+  /// find_near() for a sphere at the border that stays within `way` of x, restricted to border spheres between two
+  /// corners.
+  std::span<const std::uint32_t> find_near_at_border(Slot i, const Vec<D>& low, const Vec<D>& high, const Vec<D>& x,
+                                                     double way) {
+    return search_.find_near_at_border(i, low, high, x, way);
   }
 
  private:

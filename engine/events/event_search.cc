@@ -412,8 +412,17 @@ std::span<const std::uint32_t> EventSearch<D>::find_between(const Cell<D>& low, 
 }
 
 template <int D>
-std::span<const std::uint32_t> EventSearch<D>::find_near_at_border(Slot i, const Vec<D>& low, const Vec<D>& high) {
-  if (!lists_) return find_between(cells_->grid().cell(low), cells_->grid().cell(high));
+std::span<const std::uint32_t> EventSearch<D>::find_near_at_border(Slot i, const Vec<D>& low, const Vec<D>& high,
+                                                                   const Vec<D>& x, double way) {
+  if (cells_) {
+    const CellGrid<D>& grid = cells_->grid();
+    if (!larges_ || larges_->has(i)) return find_between(grid.cell(low), grid.cell(high));
+    // The large spheres that a small one may touch are on the lists of the blocks in which it may be.
+    const Vec<D> room = Vec<D>::Constant(2 * (tuning_.small() + max_displacement_) + way);
+    cells_->find_between(grid.cell(low.cwiseMax(x - room)), grid.cell(high.cwiseMin(x + room)), near_);
+    larges_->find_between(grid.cell(x - room), grid.cell(x + room), near_);
+    return near_;
+  }
   if (distance_left(i) == lists_->skin()) return find_near(i);
   return {lists_->candidates(queue_[i]), queue_[i].count};
 }

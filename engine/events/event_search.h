@@ -54,7 +54,8 @@ class EventSearch {
   /// As in EventCore.
   void set_border(std::span<const Slot> slots, double now);
   std::span<const std::uint32_t> find_near(Slot i);
-  std::span<const std::uint32_t> find_near_at_border(Slot i, const Vec<D>& low, const Vec<D>& high);
+  std::span<const std::uint32_t> find_near_at_border(Slot i, const Vec<D>& low, const Vec<D>& high, const Vec<D>& x,
+                                                     double way);
 
   /// Starts to prefetch the data of the next events.
   void prefetch() {

@@ -96,12 +96,12 @@ bool Ownership<D>::admit(const Record<D>& r, double now, const Internal<D>& inte
 }
 
 template <int D>
-bool Ownership<D>::meeting_place(const Record<D>& r, double end, Vec<D>& low, Vec<D>& high) const {
+bool Ownership<D>::meeting_place(Slot ghost, const Record<D>& r, double end, Vec<D>& low, Vec<D>& high) const {
   const double far = way(r, end);
   const Vec<D> at = bisection_.wrapped(r.x);
-  const double close = bisection_.reach() - max_displacement_ + far;
+  const double close = reach(ghost) - max_displacement_ + far;
   if (bisection_.squared_distance(number_, at) > close * close) return false;
-  const double room = bisection_.reach() + far;
+  const double room = reach(ghost) + far;
   low = at - Vec<D>::Constant(room);
   high = at + Vec<D>::Constant(room);
   if (!bisection_.clip(number_, 3 * max_displacement_, low, high)) return false;

@@ -56,7 +56,12 @@ class Ownership {
 
   /// The region, between two corners, in which a ghost with this record can meet own spheres before `end`: own spheres
   /// stay within `max_displacement` of the subdomain, and are known within another two. False if it is empty.
-  bool meeting_place(const Record<D>& r, double end, Vec<D>& low, Vec<D>& high) const;
+  bool meeting_place(Slot ghost, const Record<D>& r, double end, Vec<D>& low, Vec<D>& high) const;
+  /// The largest distance of a sphere from its record before `end`; under shear, across the flow.
+  double way(const Record<D>& r, double end) const {
+    const double time = end - r.t;
+    return (core_.flights().speed(r) + 0.5 * time * core_.flights().g().norm()) * time;
+  }
   /// Whether a sphere with this record can touch sphere j before `end`; j may be up to twice `max_displacement` from
   /// its record.
   bool may_meet(const Record<D>& r, Slot j, const Offset<D>& offset, double end) const;
@@ -89,11 +94,6 @@ class Ownership {
   /// The largest speed of a sphere until its next event, not 0; under shear, across the flow.
   double speed(Slot i) const {
     return (1 + 1e-6) * core_.flights().speed(core_.flights()[i]) + from_field_ + std::numeric_limits<double>::min();
-  }
-  /// The largest distance of a sphere from its record before `end`; under shear, across the flow.
-  double way(const Record<D>& r, double end) const {
-    const double time = end - r.t;
-    return (core_.flights().speed(r) + 0.5 * time * core_.flights().g().norm()) * time;
   }
 
   EventCore<D>& core_;

@@ -116,8 +116,9 @@ template <class Wanted, class Visit>
 bool WindowRepair<D>::visit_near(Slot i, const Record<D>& r, Wanted&& wanted, Visit&& visit) {
   const bool ghost = ownership_.is_ghost(i);
   Vec<D> low, high;
-  if (ghost && !ownership_.meeting_place(r, end_, low, high)) return false;
-  for (const std::uint32_t candidate : ghost ? core_.find_near_at_border(i, low, high) : core_.find_near(i)) {
+  if (ghost && !ownership_.meeting_place(i, r, end_, low, high)) return false;
+  for (const std::uint32_t candidate :
+       ghost ? core_.find_near_at_border(i, low, high, r.x, ownership_.way(r, end_)) : core_.find_near(i)) {
     const Slot j = flights_.packing().slot(candidate);
     if (!wanted(j)) continue;
     const Image<D> image = flights_.packing().image(candidate);

@@ -240,7 +240,7 @@ TEST(Ownership, AGhostMeetsWhatIsAsNearAsBothCanCome) {
       const double way = (r.v.norm() + 0.5 * left * g.norm()) * left,
                    away = std::sqrt(d.bisection.squared_distance(0, r.x));
       Vec<3> low, high;
-      const bool meets = here.meeting_place(r, end, low, high);
+      const bool meets = here.meeting_place(here.slot_of(id), r, end, low, high);
       EXPECT_EQ(meets, away <= reach - kDisplacement + way) << id;
       ++(meets ? somewhere : nowhere);
       for (const Vec<3>& place : d.system->particles.x) {  // possible partners
