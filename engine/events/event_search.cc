@@ -416,8 +416,6 @@ std::span<const std::uint32_t> EventSearch<D>::find_near_at_border(Slot i, const
                                                                    const Vec<D>& x, double way) {
   if (cells_) {
     const CellGrid<D>& grid = cells_->grid();
-    if (larges_ && larges_->has(i) && (x - larges_->centre(i)).norm() + way + max_displacement_ < larges_->skin())
-      return larges_->candidates(i);  // it stays so far inside its region that others may be outside theirs
     if (!larges_ || larges_->has(i)) return find_between(grid.cell(low), grid.cell(high));
     // The large spheres that a small one may touch are on the lists of the blocks in which it may be.
     const Vec<D> room = Vec<D>::Constant(2 * (tuning_.small() + max_displacement_) + way);

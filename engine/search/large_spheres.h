@@ -64,7 +64,6 @@ class LargeSpheres {
   ScanTask around(Slot i, const CellPlace<D>& place);
   /// All spheres that a large one may touch, as input of the kernels; valid until the next call.
   ScanTask around(Slot i) { return large_[number_[i]].list.task(i, packing_.pack(i, 0)); }
-  std::span<const std::uint32_t> candidates(Slot i) const { return large_[number_[i]].list.all(); }
 
  private:
   static constexpr std::uint32_t kSmall = 0xffffffff;
