@@ -127,7 +127,7 @@ class LargeSpheres {
   const LinkedCells<D>& cells_;
   const Packing<D>& packing_;
   std::span<const double> reach_;
-  double small_, skin_;  // negative: all spheres are large
+  double small_, skin_;  // small_ < 0: all spheres are large
   PageVector<NextEvent<D>>& next_events_;
   std::array<std::size_t, D> blocks_;  // along each axis
   std::vector<std::uint32_t> number_;  // by slot: the index in large_, kSmall or kDismissed

@@ -72,12 +72,10 @@ def main():
                 deck = ROOT / "inputs" / ("ten-to-one.toml" if given.sizes else "hard-sphere-fluid.toml")
                 counts = [f"particles.0.count={few}", f"particles.1.count={spheres}", "particles.0.mass=1.0"] if few else [
                     f"particles.0.count={spheres}"]
-                quiet = ["run.end_time=1e9", "output.frame_interval=1e9", "output.thermo_interval=1e9"]
-
-                def run(collisions, into, set_=counts + [f"placement.packing_fraction={filled}"] + quiet, deck=deck):
-                    run_carom(given.bin / "io/carom", deck, into, set_ + [f"run.collisions={collisions}"])
-
-                run((2 if given.sizes else 40) * spheres, directory / "state")
+                settings = counts + [f"placement.packing_fraction={filled}", "run.end_time=1e9", "output.frame_interval=1e9",
+                                     "output.thermo_interval=1e9"]
+                run_carom(given.bin / "io/carom", deck, directory / "state",
+                          settings + [f"run.collisions={(2 if given.sizes else 40) * spheres}"])
                 with Trajectory(directory / "state") as state:
                     edges, position = state.edges(-1), state.position(-1)
                 unit = 10 if given.sizes else 1  # EDMD's unit of length is the largest diameter
@@ -88,7 +86,7 @@ def main():
                 pairs = []
                 for k in range(given.repeat):
                     if given.sizes:
-                        run(given.collisions, directory / str(k))
+                        run_carom(given.bin / "io/carom", deck, directory / str(k), settings + [f"run.collisions={given.collisions}"])
                         rate = json.loads((directory / str(k) / "summary.json").read_text())["collisions_per_second"]
                     else:
                         subprocess.run([given.bin / "tests/benchmarks/carom_bench", "--n", str(spheres), "--packing-fraction", str(filled),

@@ -139,7 +139,7 @@ TEST(Ownership, EverySphereHasOneOwnerWhichKnowsWhereItIsAGhost) {
   EXPECT_GT(ghosts, 50u);
   EXPECT_LT(ghosts, 280u);
 
-  // The nearest large sphere in the other subdomain is farther from a small ghost than from a large one.
+  // A small sphere is a ghost only as far from the other subdomain as it can touch a largest sphere of it.
   const std::size_t of_sizes = expect_owners(Divided(random_system<3>(320, {14, 6, 6}, {P, P, P}, 0.1, 0.5, 11)), 0);
   EXPECT_GT(of_sizes, 50u);
   EXPECT_LT(of_sizes, ghosts - 20);
