@@ -12,12 +12,16 @@ namespace carom {
 
 using Bytes = std::vector<std::byte>;
 
+/// Appends `size` bytes.
+inline void put_bytes(Bytes& to, const void* from, std::size_t size) {
+  const auto* const bytes = static_cast<const std::byte*>(from);
+  to.insert(to.end(), bytes, bytes + size);
+}
+
 /// Appends a value, byte by byte.
 template <class T>
 void put(Bytes& to, const T& value) {
-  const std::size_t at = to.size();
-  to.resize(at + sizeof(T));
-  std::memcpy(to.data() + at, static_cast<const void*>(&value), sizeof(T));
+  put_bytes(to, &value, sizeof(T));
 }
 
 /// Reads what put() wrote, in its order.

@@ -64,16 +64,12 @@ template <int D>
 void EventCore<D>::load(std::vector<Record<D>> records, const Vec<D>& g, double horizon, double now,
                         double max_displacement, const std::vector<Internal<D>>& internal) {
   const auto order = along_curve<D>(records.size(), [&](std::size_t i) -> const Vec<D>& { return records[i].x; });
-  std::vector<Record<D>> sorted(records.size());
-  for (std::size_t i = 0; i < records.size(); ++i) sorted[i] = records[order[i]];
-  std::vector<Record<D>>().swap(records);
-  std::vector<Internal<D>> sorted_internal(internal.size());
-  for (std::size_t i = 0; i < internal.size(); ++i) sorted_internal[i] = internal[order[i]];
   events_ = since_sort_ = 0;
   now_ = now;
   free_.clear();
   search_.clear();
-  flights_.load(sorted, *sizes_, g, horizon, sorted_internal);
+  flights_.load(records, *sizes_, g, horizon, internal, order);
+  std::vector<Record<D>>().swap(records);
   search_.start(now, max_displacement);
 }
 

@@ -112,7 +112,7 @@ ScanSetting Flights<D>::setting() const {
 
 template <int D>
 void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon,
-                      std::span<const Internal<D>> internal) {
+                      std::span<const Internal<D>> internal, std::span<const std::uint32_t> order) {
   set_surroundings();
   g_ = g;
   field_ = g != Vec<D>::Zero();
@@ -130,9 +130,10 @@ void Flights<D>::load(std::span<const Record<D>> records, const Sizes& sizes, co
   radius_.clear();
   mass_.clear();
   internal_.clear();
-  for (const Record<D>& r : records) {
-    const auto i = static_cast<Slot>(records_.size());
-    admit(i, r, sizes.radius_of(r), sizes.mass_of(r), internal.empty() ? Internal<D>{} : internal[i]);
+  for (Slot i = 0; i < records.size(); ++i) {
+    const std::size_t from = order.empty() ? i : order[i];
+    const Record<D>& r = records[from];
+    admit(i, r, sizes.radius_of(r), sizes.mass_of(r), internal.empty() ? Internal<D>{} : internal[from]);
   }
 }
 

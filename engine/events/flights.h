@@ -40,10 +40,10 @@ class Flights {
   /// Starts a slab: all spheres at time 0, in the slots assigned before.
   void load(const Particles<D>& particles, const Vec<D>& g, double horizon, double growth);
 
-  /// Loads records of various times, in their order, with room for spheres that are admitted later. `internal`: the
-  /// internal state of each, if there is one.
+  /// Loads records of various times, with room for spheres that are admitted later. `internal`: the internal state of
+  /// each, if there is one; `order`: the record in each slot, if not the one with its number.
   void load(std::span<const Record<D>> records, const Sizes& sizes, const Vec<D>& g, double horizon,
-            std::span<const Internal<D>> internal = {});
+            std::span<const Internal<D>> internal = {}, std::span<const std::uint32_t> order = {});
 
   /// Frees the memory for spheres until the next load().
   void release() { PageVector<Record<D>>().swap(records_); }

@@ -90,6 +90,10 @@ class Trace {
     before_[2 * size_] = a;
     before_[2 * size_ + 1] = b;
     ++size_;
+    if (size_ < events_.size()) {  // the log is larger than the caches near the core
+      prefetch_to_write(&events_[size_] + 1);
+      for (const std::size_t which : {0u, 1u}) prefetch_to_write(&before_[2 * size_ + which]);
+    }
   }
   /// Call after begin() if spheres have an internal state.
   void note_internal(const Internal<D>& a, const Internal<D>& b) {

@@ -70,6 +70,19 @@ Value accumulated_in_order(Communicator& ranks, Value value, Add&& add) {
   return value;
 }
 
+/// Messages to ranks that consist of records of `size` bytes. for_each(send) calls send(rank, write) for each record,
+/// and write(message) appends it. for_each() is called twice, first to count the records: messages that grow would be
+/// copied several times.
+template <class ForEach>
+std::vector<Bytes> messages_of_records(std::size_t ranks, std::size_t size, ForEach&& for_each) {
+  std::vector<std::size_t> records(ranks);
+  for_each([&](std::size_t rank, auto&&) { ++records[rank]; });
+  std::vector<Bytes> messages(ranks);
+  for (std::size_t r = 0; r < ranks; ++r) messages[r].reserve(records[r] * size);
+  for_each([&](std::size_t rank, auto&& write) { write(messages[rank]); });
+  return messages;
+}
+
 /// Values as a message.
 template <class Value>
 Bytes message_of(std::span<const Value> values) {

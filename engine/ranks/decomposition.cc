@@ -86,10 +86,11 @@ const Particles<D>& Decomposition<D>::block() {
       blocks(), *ranks_, size,
       [&](auto&& send) {
         for (Id i = 0; i < p.size(); ++i)
-          if (p.owns(i)) {
-            const State state{p.x[i], p.v[i], p.image[i], has_internal ? p.internal(i) : Internal<D>{}};
-            send(p.id_of(i), reinterpret_cast<const std::byte*>(&state));
-          }
+          if (p.owns(i))
+            send(p.id_of(i), [&](Bytes& to) {
+              const State state{p.x[i], p.v[i], p.image[i], has_internal ? p.internal(i) : Internal<D>{}};
+              put_bytes(to, &state, size);
+            });
       },
       [&](std::size_t place, const std::byte* bytes) {
         State state;
@@ -112,7 +113,7 @@ Bytes Decomposition<D>::block_of(Fields::Field& field) const {
       blocks(), *ranks_, field.size,
       [&](auto&& send) {
         for (Id i = 0; i < p.size(); ++i)
-          if (p.owns(i)) send(p.id_of(i), data + i * field.size);
+          if (p.owns(i)) send(p.id_of(i), [&](Bytes& to) { put_bytes(to, data + i * field.size, field.size); });
       },
       [&](std::size_t place, const std::byte* bytes) {
         std::memcpy(block.data() + place * field.size, bytes, field.size);

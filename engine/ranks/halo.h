@@ -24,23 +24,33 @@ Particles<D> halo_of(const Box<D>& box, double distance, Communicator& ranks, co
     std::uint16_t species;
   };
   const Bisection<D> bisection(box, block.x, static_cast<std::size_t>(ranks.size()), distance * (1 + 1e-6), ranks);
-  std::vector<Bytes> outgoing(static_cast<std::size_t>(ranks.size()));
-  for (Id i = 0; i < block.size(); ++i) {
-    const Copy copy{block.x[i],     block.v[i],      block.radius[i], block.fixed(i) ? block.mass[i] : 1,
-                    block.id_of(i), block.species[i]};
-    bisection.for_each_near(bisection.wrapped(copy.x), [&](std::uint32_t rank) { put(outgoing[rank], copy); });
-  }
-  auto copies = values_in<Copy>(ranks.swap(std::move(outgoing)));
-  if (!std::ranges::is_sorted(copies, {}, &Copy::id)) std::ranges::sort(copies, {}, &Copy::id);
+  auto outgoing = messages_of_records(static_cast<std::size_t>(ranks.size()), sizeof(Copy), [&](auto&& send) {
+    for (Id i = 0; i < block.size(); ++i)
+      bisection.for_each_near(bisection.wrapped(block.x[i]), [&](std::uint32_t rank) {
+        send(rank, [&](Bytes& to) {
+          put(to, Copy{block.x[i], block.v[i], block.radius[i], block.fixed(i) ? block.mass[i] : 1, block.id_of(i),
+                       block.species[i]});
+        });
+      });
+  });
+  std::vector<Bytes> incoming = ranks.swap(std::move(outgoing));  // by rank, so in the order of ids
+  std::size_t bytes = 0;
+  for (const Bytes& message : incoming) bytes += message.size();
   Particles<D> halo;
-  for (const Copy& copy : copies) {
-    halo.x.push_back(copy.x);
-    halo.v.push_back(copy.v);
-    halo.radius.push_back(copy.radius);
-    halo.species.push_back(copy.species);
-    halo.mass.push_back(copy.mass);
-    halo.id.push_back(copy.id);
-    halo.ghost.push_back(bisection.owner(bisection.wrapped(copy.x)) != static_cast<std::uint32_t>(ranks.rank()));
+  const auto reserve = [&](auto&... arrays) { (arrays.reserve(bytes / sizeof(Copy)), ...); };
+  reserve(halo.x, halo.v, halo.radius, halo.species, halo.mass, halo.id, halo.ghost);
+  for (Bytes& message : incoming) {
+    for (Reader reader(message); reader.more();) {
+      const auto copy = reader.get<Copy>();
+      halo.x.push_back(copy.x);
+      halo.v.push_back(copy.v);
+      halo.radius.push_back(copy.radius);
+      halo.species.push_back(copy.species);
+      halo.mass.push_back(copy.mass);
+      halo.id.push_back(copy.id);
+      halo.ghost.push_back(bisection.owner(bisection.wrapped(copy.x)) != static_cast<std::uint32_t>(ranks.rank()));
+    }
+    Bytes().swap(message);
   }
   return halo;
 }

@@ -23,15 +23,17 @@ struct IdBlocks {
   }
 };
 
-/// Sends data of particles, `size` bytes each, to the ranks of their blocks: for_each(send) calls send(id, bytes) for
-/// each particle on one of the ranks; store(place, bytes) is called on the rank of its block, place being the index in
-/// the block. Collective.
+/// Sends data of particles, `size` bytes each, to the ranks of their blocks: for_each(send) calls send(id, write) for
+/// each particle on one of the ranks, and write(message) appends its data; for_each() is called twice. take(place,
+/// bytes) is called on the rank of its block, place being the index in the block. Collective.
 void to_id_blocks(const IdBlocks& blocks, Communicator& ranks, std::size_t size, auto&& for_each, auto&& take) {
-  std::vector<Bytes> outgoing(blocks.ranks);
-  for_each([&](Id id, const std::byte* bytes) {
-    Bytes& to = outgoing[static_cast<std::size_t>(blocks.rank_of(id))];
-    put(to, id);
-    to.insert(to.end(), bytes, bytes + size);
+  auto outgoing = messages_of_records(blocks.ranks, sizeof(Id) + size, [&](auto&& send) {
+    for_each([&](Id id, auto&& write) {
+      send(static_cast<std::size_t>(blocks.rank_of(id)), [&](Bytes& to) {
+        put(to, id);
+        write(to);
+      });
+    });
   });
   const Id first = blocks.first(ranks.rank());
   for (const Bytes& bytes : ranks.swap(std::move(outgoing)))

@@ -120,7 +120,10 @@ void Ownership<D>::sort_out(double now, double length, Send&& send) {
   if (unwatched_ += max_displacement_; unwatched_ > kWindowsBetweenSearches * max_displacement_) watch(now);
   // A sphere with one event moved at most as fast as before or after it, one with several at most max_displacement_.
   // Here only the excess over speed · length is subtracted; the loop below subtracts speed · length itself.
-  for (const Slot i : std::span(with_events_.data(), number_with_events_)) {
+  constexpr std::size_t kAhead = 8;
+  for (std::size_t n = 0; n < number_with_events_; ++n) {
+    if (n + kAhead < number_with_events_) prefetch_line(&core_.flights()[with_events_[n + kAhead]]);
+    const Slot i = with_events_[n];
     const std::uint32_t k = watched_at_[i];
     const double before =
         events_[k] == Events::one ? std::min(speed_[k] * length, max_displacement_) : max_displacement_;

@@ -26,8 +26,8 @@ struct StepAccount {
   void check(const Steps& steps, double by_events, const std::string& when) const;
 };
 
-/// What this rank's pairs contribute; `state`: positions and velocities of this rank's particles. `near`: the list of
-/// pairs_within_reach(), or null, where one is made. Collective if pairs have steps.
+/// What this rank's pairs contribute; `state`: positions and velocities of this rank's particles. `near`: a list of the
+/// pairs that may have steps between them, or null. Collective if pairs have steps.
 template <int D>
 StepAccount own_steps(const System<D>& system, const Particles<D>& state, NeighbourList<D>* near = nullptr);
 
@@ -35,11 +35,5 @@ StepAccount own_steps(const System<D>& system, const Particles<D>& state, Neighb
 /// others, and without steps. The bits are the same on any number of ranks. Collective if pairs have steps.
 template <int D>
 std::vector<double> step_energies(const System<D>& system, const Particles<D>& state);
-
-/// The pairs to which something may happen before the next list.
-template <int D>
-NeighbourList<D> pairs_within_reach(const System<D>& system, const Particles<D>& state) {
-  return NeighbourList<D>(system.box, system.box.steps.reach()(state.radius), state.ghost, state.all_fixed());
-}
 
 }  // namespace carom

@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "engine/base/error.h"
-#include "engine/ranks/halo.h"
 #include "engine/ranks/shared_contacts.h"
 
 namespace carom {
@@ -43,40 +42,50 @@ void WindowedFlight<D>::take(Particles<D>& particles, const Vec<D>& g, double ho
   };
   while (!divide(subdomains_)) subdomains_ -= (subdomains_ + 7) / 8;  // the box is too small for so many subdomains
   subdomain_.counts.subdomains = subdomains_;
-  load(0, [&](auto&& add) {
+  auto spheres = messages([&](auto&& add) {
     for (Id i = 0; i < particles.size(); ++i)
       add(particles.x[i], {particles.x[i], particles.v[i], 0.0, particles.id_of(i), 0, particles.species[i]},
           has_internal() ? particles.internal(i) : Internal<D>{});
-    std::vector<Vec<D>>().swap(particles.x);
-    std::vector<Vec<D>>().swap(particles.v);
   });
+  std::vector<Vec<D>>().swap(particles.x);
+  std::vector<Vec<D>>().swap(particles.v);
+  load(0, std::move(spheres));
   run_before_ = subdomain_.counts.run_events;
 }
 
-/// Loads all subdomains. `spheres(add)` calls add(x, record, internal state) for each sphere, now at x, on one of the
-/// ranks.
+/// Messages to the subdomains. `spheres(add)` calls add(x, record, internal state) for each sphere, now at x, on one of
+/// the ranks; it is called twice.
 template <int D>
 template <class Spheres>
-void WindowedFlight<D>::load(double now, Spheres&& spheres) {
-  std::vector<Bytes> outgoing(static_cast<std::size_t>(ranks_.size()));
-  spheres([&](const Vec<D>& x, const Record<D>& r, const Internal<D>& internal) {
-    const double reach = bisection_->reach_of(box_.steps.reach()(sizes_.radius_of(r)));
-    bisection_->for_each_near(bisection_->wrapped(x), reach,
-                              [&](std::uint32_t rank) { subdomain_.put_sphere(outgoing[rank], r, internal); });
+std::vector<Bytes> WindowedFlight<D>::messages(Spheres&& spheres) {
+  const std::size_t size = sizeof(Record<D>) + (has_internal() ? sizeof(Internal<D>) : 0);
+  return messages_of_records(static_cast<std::size_t>(ranks_.size()), size, [&](auto&& send) {
+    spheres([&](const Vec<D>& x, const Record<D>& r, const Internal<D>& internal) {
+      const double reach = bisection_->reach_of(box_.steps.reach()(sizes_.radius_of(r)));
+      bisection_->for_each_near(bisection_->wrapped(x), reach, [&](std::uint32_t rank) {
+        send(rank, [&](Bytes& to) { subdomain_.put_sphere(to, r, internal); });
+      });
+    });
   });
-  subdomain_.load(ranks_.swap(std::move(outgoing)), *bisection_, g_, horizon_, now, length_.max_displacement());
+}
+
+/// Loads all subdomains.
+template <int D>
+void WindowedFlight<D>::load(double now, std::vector<Bytes> spheres) {
+  subdomain_.load(ranks_.swap(std::move(spheres)), *bisection_, g_, horizon_, now, length_.max_displacement());
   now_ = now;
 }
 
 /// Loads all subdomains again from their present spheres.
 template <int D>
 void WindowedFlight<D>::reload() {
-  load(now_, [&](auto&& add) {
-    for (const Slot i : subdomain_.own()) {
-      const Record<D>& r = subdomain_.paths().after(i);
-      add(subdomain_.flights().at(r, now_).x, r, subdomain_.paths().internal_after(i));
-    }
-  });
+  const std::vector<Slot> own = subdomain_.own();
+  load(now_, messages([&](auto&& add) {
+         for (const Slot i : own) {
+           const Record<D>& r = subdomain_.paths().after(i);
+           add(subdomain_.flights().at(r, now_).x, r, subdomain_.paths().internal_after(i));
+         }
+       }));
 }
 
 /// The key of the n-th contact of a window over all ranks, or of the n-th collision of two cores, n from 1. Collective.
@@ -218,13 +227,17 @@ void WindowedFlight<D>::copy_at(double time, Particles<D>& copies) {
   work_.resize(here);
   if (has_internal()) copies.resize_internal(here);
   const std::size_t size = has_internal() ? sizeof(State) : offsetof(State, internal);
+  const std::vector<Slot> own = subdomain_.own();
   to_id_blocks(
       blocks(), ranks_, size,
       [&](auto&& send) {
-        for (const Slot i : subdomain_.own()) {
-          const Record<D> r = subdomain_.flights().at(subdomain_.paths().after(i), time);
-          const State state{subdomain_work_, r.x, r.v, subdomain_.paths().internal_after(i)};
-          send(r.id, reinterpret_cast<const std::byte*>(&state));
+        for (const Slot i : own) {
+          const Record<D>& after = subdomain_.paths().after(i);
+          send(after.id, [&](Bytes& to) {
+            const Record<D> r = subdomain_.flights().at(after, time);
+            const State state{subdomain_work_, r.x, r.v, subdomain_.paths().internal_after(i)};
+            put_bytes(to, &state, size);
+          });
         }
       },
       [&](std::size_t place, const std::byte* bytes) {

@@ -52,7 +52,8 @@ class WindowedFlight {
   void measure_work();
   void reload();
   template <class Spheres>
-  void load(double now, Spheres&& spheres);
+  std::vector<Bytes> messages(Spheres&& spheres);
+  void load(double now, std::vector<Bytes> spheres);
   EventKey<D> key_of_contact(std::uint64_t number, bool pairs);
   /// What a rank knows after a round of a window, and what all ranks know together.
   struct Vote {

@@ -11,6 +11,7 @@
 #include "engine/base/error.h"
 #include "engine/ranks/halo.h"
 #include "engine/run/measurement.h"
+#include "engine/search/sized_cells.h"
 
 namespace carom {
 
@@ -109,7 +110,8 @@ Monitor<D>::Monitor(System<D>& system, const IntegratorInfo& info, const Plan& p
       },
       [this] {
         const Particles<D>& p = system_.particles;
-        if (info_.hard_cores) touching_.emplace(pairs_within_reach(system_, p));
+        if (info_.hard_cores && info_.stepping)
+          touching_.emplace(system_.box, system_.box.steps.reach()(p.radius), p.ghost, p.all_fixed());
         if (has_shadow()) scratch_.resize(p.size());
       });
 }
@@ -449,27 +451,27 @@ std::vector<WallLoad> Monitor<D>::wall_loads(double time) {
 template <int D>
 OverlapTally Monitor<D>::overlaps(double time) {
   OverlapTally found;
-  const auto look = [&](NeighbourList<D>& list, const Particles<D>& p) {
-    for (const auto& pair : list.cover(p.x)) {
-      const double sigma =
-          system_.box.steps.core_distance(p.id_of(pair.i), p.id_of(pair.j), p.radius[pair.i] + p.radius[pair.j]);
-      const double squared = (p.x[pair.i] - p.x[pair.j] + system_.box.shift(pair.image)).squaredNorm();
-      if (squared >= sigma * sigma) continue;
-      const double depth = 1 - std::sqrt(squared) / sigma;
-      found.note_overlap(
-          depth, [&] { return Overlap(depth, sigma, pair_key<D>(time, 0, p.id_of(pair.i), p.id_of(pair.j), {})); });
-    }
+  const Box<D>& box = system_.box;
+  const auto look = [&](const Particles<D>& p, Id i, Id j, const Image<D>& image) {
+    const double sigma = box.steps.core_distance(p.id_of(i), p.id_of(j), p.radius[i] + p.radius[j]);
+    const double squared = (p.x[i] - p.x[j] + box.shift(image)).squaredNorm();
+    if (squared >= sigma * sigma) return;
+    const double depth = 1 - std::sqrt(squared) / sigma;
+    found.note_overlap(depth,
+                       [&] { return Overlap(depth, sigma, pair_key<D>(time, 0, p.id_of(i), p.id_of(j), {})); });
+  };
+  const auto look_at_all = [&](const Particles<D>& p) {
+    visit_close_pairs<D>(box, p.x, box.steps.reach()(p.radius), p.ghost, p.all_fixed(),
+                         [&](Id i, Id j, const Image<D>& image) { look(p, i, j, image); });
   };
   const Particles<D>& p = system_.particles;
   const Decomposition<D>& ranks = system_.decomposition;
-  if (ranks.joined() && !ranks.by_place()) {
-    const double reach = system_.box.steps.reach()(ranks.sizes().largest_radius());
-    const Particles<D> halo = halo_of(system_.box, 2 * reach, ranks.ranks(), p);
-    NeighbourList<D> touching = pairs_within_reach(system_, halo);
-    look(touching, halo);
-  } else {
-    look(*touching_, p);
-  }
+  if (ranks.joined() && !ranks.by_place())
+    look_at_all(halo_of(box, 2 * box.steps.reach()(ranks.sizes().largest_radius()), ranks.ranks(), p));
+  else if (touching_)
+    for (const auto& [i, j, image] : touching_->cover(p.x)) look(p, i, j, image);
+  else
+    look_at_all(p);
   return found;
 }
 

@@ -198,19 +198,13 @@ template <int D>
 Overlaps find_overlaps(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> radius,
                        std::span<const char> beyond, std::span<const char> fixed, std::span<const Id> id) {
   Overlaps found;
-  SizedCells<D> cells(box, radius, Extent<D>(x));
   const GapTolerance tolerance = box.gap_tolerance();
-  for (Id i = 0; i < x.size(); ++i) {
-    const auto look = [&](Id j, const Image<D>& image) {
-      if (!fixed.empty() && fixed[i] != 0 && fixed[j] != 0) return;
-      const double distance = (x[i] - x[j] + box.shift(image)).norm(),
-                   contact =
-                       box.steps.core_distance(id.empty() ? i : id[i], id.empty() ? j : id[j], radius[i] + radius[j]);
-      if (distance < contact - tolerance(contact)) found.add({1, j, i, distance, contact});
-    };
-    if (beyond.empty() || beyond[i] == 0) cells.for_each_near(x[i], radius[i], look);
-    cells.insert(i, x[i], radius[i]);
-  }
+  visit_close_pairs<D>(box, x, radius, beyond, fixed, [&](Id i, Id j, const Image<D>& image) {
+    const double distance = (x[i] - x[j] + box.shift(image)).norm(),
+                 contact =
+                     box.steps.core_distance(id.empty() ? i : id[i], id.empty() ? j : id[j], radius[i] + radius[j]);
+    if (distance < contact - tolerance(contact)) found.add({1, j, i, distance, contact});
+  });
   return found;
 }
 
