@@ -457,8 +457,7 @@ OverlapTally Monitor<D>::overlaps(double time) {
     const double squared = (p.x[i] - p.x[j] + box.shift(image)).squaredNorm();
     if (squared >= sigma * sigma) return;
     const double depth = 1 - std::sqrt(squared) / sigma;
-    found.note_overlap(depth,
-                       [&] { return Overlap(depth, sigma, pair_key<D>(time, 0, p.id_of(i), p.id_of(j), {})); });
+    found.note_overlap(depth, [&] { return Overlap(depth, sigma, pair_key<D>(time, 0, p.id_of(i), p.id_of(j), {})); });
   };
   const auto look_at_all = [&](const Particles<D>& p) {
     visit_close_pairs<D>(box, p.x, box.steps.reach()(p.radius), p.ghost, p.all_fixed(),
