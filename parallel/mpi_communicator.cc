@@ -88,7 +88,7 @@ void MpiCommunicator::end_combine() {
   for (std::size_t k = 0; k < most_.size(); ++k) most_[k] = std::bit_cast<double>(mine_[sums_.size() + k]);
 }
 
-void MpiCommunicator::start(std::vector<Bytes> outgoing, std::span<const int> partners,
+void MpiCommunicator::start(std::vector<Bytes>& outgoing, std::span<const int> partners,
                             std::span<const std::size_t> sizes, std::span<double> most) {
   watch_.begin_call();
   departures_[0].messages.swap(departures_[1].messages);
@@ -97,10 +97,11 @@ void MpiCommunicator::start(std::vector<Bytes> outgoing, std::span<const int> pa
   std::vector<MPI_Request>& requests = departures_[0].requests;
   if (!requests.empty()) watch_.wait(requests);
   requests.clear();
-  messages = std::move(outgoing);
-  arriving_.resize(partners.size());
+  messages.swap(outgoing);
+  arriving_[0].swap(arriving_[1]);
+  arriving_[0].resize(partners.size());
   for (std::size_t k = 0; k < partners.size(); ++k) {
-    Bytes &in = arriving_[k], &out = messages[k];
+    Bytes &in = arriving_[0][k], &out = messages[k];
     in.resize(sizes[k]);
     in_pieces(in.size(), [&](std::size_t at, int count) {
       MPI_Irecv(in.data() + at, count, MPI_BYTE, partners[k], known, world_,
@@ -113,12 +114,12 @@ void MpiCommunicator::start(std::vector<Bytes> outgoing, std::span<const int> pa
   begin_combine(most, {});
 }
 
-std::vector<Bytes> MpiCommunicator::complete() {
+const std::vector<Bytes>& MpiCommunicator::complete() {
   watch_.begin_call();
   if (!receiving_.empty()) watch_.wait(receiving_);
   receiving_.clear();
   end_combine();
-  return std::move(arriving_);
+  return arriving_[0];
 }
 
 std::vector<Bytes> MpiCommunicator::trade(const std::function<const Bytes&(std::size_t)>& outgoing) {

@@ -24,9 +24,9 @@ class MpiCommunicator : public Communicator {
   std::vector<Bytes> swap(std::vector<Bytes> outgoing, std::span<const int> partners) override;
   std::vector<Bytes> gather(const Bytes& mine) override;
   void combine(std::span<double> most, std::span<std::uint64_t> sums) override;
-  void start(std::vector<Bytes> outgoing, std::span<const int> partners, std::span<const std::size_t> sizes,
+  void start(std::vector<Bytes>& outgoing, std::span<const int> partners, std::span<const std::size_t> sizes,
              std::span<double> most) override;
-  std::vector<Bytes> complete() override;
+  const std::vector<Bytes>& complete() override;
   double seconds_waited() const override { return watch_.seconds_waited(); }
 
  private:
@@ -55,7 +55,7 @@ class MpiCommunicator : public Communicator {
   std::size_t round_ = 0;
   std::array<MPI_Request, 2> combining_ = {MPI_REQUEST_NULL, MPI_REQUEST_NULL};
   std::vector<MPI_Request> receiving_;  // from start() to complete()
-  std::vector<Bytes> arriving_;
+  std::array<std::vector<Bytes>, 2> arriving_;  // of this exchange and of the one before: methods alternate two kinds
   /// Messages that start() sends. Long ones leave only while the receiver waits in complete(), so this rank waits for
   /// them two exchanges later: it may be up to a step ahead of its neighbours.
   struct Departure {

@@ -31,14 +31,16 @@ class Communicator {
   /// Replaces each of `most` by its maximum over all ranks and each of `sums` by its sum.
   virtual void combine(std::span<double> /*most*/, std::span<std::uint64_t> /*sums*/) {}
   /// Begins an exchange between neighbours as swap(), with sizes[k] bytes to come from partners[k], and a combine().
-  /// Both end with complete(), which returns the messages; until then `most` must stay, and no other call but swap() of
-  /// all ranks and gather() is allowed.
-  virtual void start(std::vector<Bytes> outgoing, std::span<const int> partners, std::span<const std::size_t> /*sizes*/,
-                     std::span<double> most) {
+  /// On return, `outgoing` has earlier messages, the memory of which can be used for the next ones. Both end with
+  /// complete(), which returns the messages, valid until the next start(). Until then `most` must stay, and no other
+  /// call but swap() of all ranks and gather() is allowed.
+  virtual void start(std::vector<Bytes>& outgoing, std::span<const int> partners,
+                     std::span<const std::size_t> /*sizes*/, std::span<double> most) {
     arrived_ = swap(std::move(outgoing), partners);
+    outgoing.clear();
     combine(most, {});
   }
-  virtual std::vector<Bytes> complete() { return std::move(arrived_); }
+  virtual const std::vector<Bytes>& complete() { return arrived_; }
   /// The time for which this rank has waited for others [s].
   virtual double seconds_waited() const { return 0; }
   void largest(std::span<double> values) { combine(values, {}); }

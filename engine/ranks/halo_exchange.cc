@@ -51,7 +51,7 @@ bool HaloExchange<D>::add_ghosts(Communicator& ranks, ForceSums<D>& sums) const 
       const Words taken = sums.take(i, high);
       std::memcpy(to, &taken, sizeof(Words));
     });
-    const std::vector<Bytes> incoming = ranks.complete();
+    const std::vector<Bytes>& incoming = ranks.complete();
     for (std::size_t k = 0; k < neighbours_.size(); ++k) {
       const std::span taken(reinterpret_cast<const Words*>(incoming[k].data()), incoming[k].size() / sizeof(Words));
       sums.add(copied_to_[static_cast<std::size_t>(neighbours_[k])], taken, high);

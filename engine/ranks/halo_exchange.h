@@ -47,7 +47,7 @@ class HaloExchange {
   }
   template <class... T>
   void finish(Communicator& ranks, std::span<T>... values) const {
-    const std::vector<Bytes> incoming = ranks.complete();
+    const std::vector<Bytes>& incoming = ranks.complete();
     for (std::size_t k = 0; k < neighbours_.size(); ++k) {
       const std::byte* from = incoming[k].data();
       for (const Id i : copies_of_[static_cast<std::size_t>(neighbours_[k])])
@@ -60,21 +60,23 @@ class HaloExchange {
   /// Starts an exchange of so many bytes for each particle; pack(to, i) writes those for an entry of `from`.
   void send(Communicator& ranks, const Lists& from, const Lists& to, std::size_t bytes, std::span<double> most,
             auto&& pack) const {
-    std::vector<Bytes> outgoing;
+    outgoing_.resize(neighbours_.size());
     std::vector<std::size_t> sizes;
-    for (const int neighbour : neighbours_) {
-      const auto rank = static_cast<std::size_t>(neighbour);
+    for (std::size_t k = 0; k < neighbours_.size(); ++k) {
+      const auto rank = static_cast<std::size_t>(neighbours_[k]);
       sizes.push_back(bytes * to[rank].size());
-      std::byte* at = outgoing.emplace_back(bytes * from[rank].size()).data();
+      outgoing_[k].resize(bytes * from[rank].size());
+      std::byte* at = outgoing_[k].data();
       for (const Id i : from[rank]) pack(at, i), at += bytes;
     }
-    ranks.start(std::move(outgoing), neighbours_, sizes, most);
+    ranks.start(outgoing_, neighbours_, sizes, most);
   }
 
   Lists copied_to_, copies_of_;  // by rank: own particles with ghosts there; ghosts owned there
   std::vector<int> neighbours_;  // ranks with entries in either
   std::vector<char> matters_;
-  std::vector<Vec<D>> at_;  // unwrapped positions at assign()
+  std::vector<Vec<D>> at_;               // unwrapped positions at assign()
+  mutable std::vector<Bytes> outgoing_;  // the next messages, in memory that is used again
 };
 
 }  // namespace carom
