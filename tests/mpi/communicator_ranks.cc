@@ -97,7 +97,7 @@ void check_calls(Communicator& ranks) {
     }
     std::vector<double> most = {static_cast<double>(rank), -1.0 - rank};
     if (length == 1000) most.clear();
-    ranks.start(std::move(messages), partners, sizes, most);
+    ranks.start(messages, partners, sizes, most);
     require(ranks.gather(filled(3, rank, 0)).size() == static_cast<std::size_t>(size), "gather before complete");
     const auto arrived = ranks.complete();
     for (std::size_t k = 0; k < partners.size(); ++k)
@@ -107,7 +107,7 @@ void check_calls(Communicator& ranks) {
     for (int step = 0; step < 6; ++step) {
       messages.clear();
       for (std::size_t k = 0; k < partners.size(); ++k) messages.push_back(filled(length, rank, step));
-      ranks.start(std::move(messages), partners, std::vector<std::size_t>(partners.size(), length), {});
+      ranks.start(messages, partners, std::vector<std::size_t>(partners.size(), length), {});
       if (length > 1000 && step % size == rank) sleep(0.1);
       const auto next = ranks.complete();
       for (std::size_t k = 0; k < partners.size(); ++k)
