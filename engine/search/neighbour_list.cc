@@ -85,10 +85,7 @@ void NeighbourList<D>::follow_wrap(Id i, std::span<const Vec<D>> x, std::vector<
 /// Returns false if there are far too many pairs.
 template <int D>
 bool NeighbourList<D>::build(std::span<const Vec<D>> x) {
-  for (std::size_t i = 0; i < x.size(); ++i)
-    if (!x[i].allFinite())
-      throw Error(Failure::numerical,
-                  "the position of particle " + std::to_string(i) + " is not finite; use a smaller integrator.step");
+  need_finite_positions<D>(x);
   ++rebuilds_;
   built_at_.assign(x.begin(), x.end());
   built_with_tilt_ = box_.tilt;

@@ -8,9 +8,11 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "engine/base/error.h"
 #include "engine/search/cell_grid.h"
 
 namespace carom {
@@ -88,13 +90,23 @@ class SizedCells {
   std::vector<Place> places_;               // by particle
 };
 
+/// Throws Error(Failure::numerical) if a position is not finite.
+template <int D>
+void need_finite_positions(std::span<const Vec<D>> x) {
+  for (std::size_t i = 0; i < x.size(); ++i)
+    if (!x[i].allFinite())
+      throw Error(Failure::numerical,
+                  "the position of particle " + std::to_string(i) + " is not finite; use a smaller integrator.step");
+}
+
 /// Calls visit(i, j, image), j < i, once for each pair of particles that may touch: the distance of x_i from
 /// x_j − shift(image) may be the sum of their reaches. Excluded are pairs whose particle i is marked in `without`, and
-/// pairs of two particles marked in `fixed`; empty marks exclude none. One visit of all pairs costs far less than a
-/// NeighbourList.
+/// pairs of two particles marked in `fixed`; empty marks exclude none. Throws Error(Failure::numerical) if a
+/// position is not finite. One visit of all pairs costs far less than a NeighbourList.
 template <int D, class Visit>
 void visit_close_pairs(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> reach,
                        std::span<const char> without, std::span<const char> fixed, Visit&& visit) {
+  need_finite_positions<D>(x);
   SizedCells<D> cells(box, reach, Extent<D>(x));
   for (Id i = 0; i < x.size(); ++i) {
     const auto look = [&](Id j, const Image<D>& image) {

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "engine/base/error.h"
+#include "engine/search/sized_cells.h"
 
 namespace carom::neighbour_list_test {
 namespace {
@@ -46,6 +47,23 @@ void expect_covered(const Box<D>& box, const std::vector<Vec<D>>& x, const std::
     EXPECT_TRUE(listed.contains(pair)) << pair.i << " " << pair.j << " image " << pair.image[0];
 }
 
+/// visit_close_pairs() against all pairs, among particles of which some are marked.
+template <int D>
+void expect_visited(const Box<D>& box, const std::vector<Vec<D>>& x, const std::vector<double>& reach) {
+  std::vector<char> without(x.size()), fixed(x.size());
+  for (std::size_t i = 0; i < x.size(); ++i) without[i] = i % 5 == 1, fixed[i] = i % 3 == 0;
+  std::set<NeighbourPair<D>> visited;
+  visit_close_pairs<D>(box, x, reach, without, fixed, [&](Id i, Id j, Image<D> image) {
+    EXPECT_FALSE(j >= i || without[i] || (fixed[i] && fixed[j]));
+    for (std::int32_t& k : image) k = -k;  // as seen from the other particle
+    EXPECT_TRUE(visited.insert({j, i, image}).second) << "a pair is visited twice";
+  });
+  for (const auto& pair : brute_force<D>(box, x, reach))
+    if (!without[pair.j] && !(fixed[pair.i] && fixed[pair.j])) {
+      EXPECT_TRUE(visited.contains(pair)) << pair.i << " " << pair.j;
+    }
+}
+
 template <int D>
 void walk(Boundary boundary, double edge, double reach) {
   Box<D> box;
@@ -66,6 +84,11 @@ void walk(Boundary boundary, double edge, double reach) {
       for (int k = 0; k < D; ++k) p[k] += step(random);
     const auto pairs = list.cover(x, moved);
     expect_covered<D>(box, x, std::vector<double>(x.size(), reach / 2), pairs);
+    if (calls % 20 == 0) {
+      std::vector<double> unequal(x.size());
+      for (std::size_t i = 0; i < x.size(); ++i) unequal[i] = reach / 2 / static_cast<double>(1 + i % 4);
+      expect_visited<D>(box, x, unequal);
+    }
     // At the end of the step positions are not wrapped yet: the list's images are those at the start.
     std::set<NeighbourPair<D>> listed(pairs.begin(), pairs.end());
     for (const auto& pair : brute_force<D>(box, moved, std::vector<double>(x.size(), reach / 2)))
@@ -136,6 +159,7 @@ TEST(NeighbourList, RecoversFromOneWildStep) {
   EXPECT_THROW(list.cover(x, wild), Error);
   wild[0][0] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(NeighbourList<2>(box, {0.1, 0.1, 0.1}).cover(wild), Error);
+  EXPECT_THROW(visit_close_pairs<2>(box, wild, std::vector<double>(3, 0.1), {}, {}, [](Id, Id, auto&) {}), Error);
 }
 
 template <int D>
