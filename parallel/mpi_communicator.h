@@ -54,7 +54,7 @@ class MpiCommunicator : public Communicator {
   std::vector<Round> rounds_;
   std::size_t round_ = 0;
   std::array<MPI_Request, 2> combining_ = {MPI_REQUEST_NULL, MPI_REQUEST_NULL};
-  std::vector<MPI_Request> receiving_;  // from start() to complete()
+  std::vector<MPI_Request> receiving_;          // from start() to complete()
   std::array<std::vector<Bytes>, 2> arriving_;  // of this exchange and of the one before: methods alternate two kinds
   /// Messages that start() sends. Long ones leave only while the receiver waits in complete(), so this rank waits for
   /// them two exchanges later: it may be up to a step ahead of its neighbours.
