@@ -5,8 +5,7 @@
 
 #include "engine/base/error.h"
 #include "engine/events/step_event.h"
-#include "engine/ranks/halo.h"
-#include "engine/search/sized_cells.h"
+#include "engine/ranks/close_pairs.h"
 
 namespace carom {
 
@@ -33,31 +32,17 @@ void visit_pairs_inside(const System<D>& system, const Particles<D>& state, Neig
   const Box<D>& box = system.box;
   const double rounding = box.gap_tolerance()(0);
   const bool epoch = box.step == 0;  // free flight
-  const auto look = [&](const Particles<D>& p) {
-    return [&](Id i, Id j, const Image<D>& image) {
-      const PairSteps* const steps = box.steps.find(p.id_of(i), p.species[i], p.id_of(j), p.species[j]);
-      if (!steps) return;
-      const double sigma = p.radius[i] + p.radius[j];
-      const std::size_t passed = steps_passed<D>(*steps, {p.x[i] - p.x[j] + box.shift(image), p.v[i] - p.v[j]}, sigma,
-                                                 side_tolerance(false, epoch, sigma, rounding),
-                                                 approach_slack(sigma, p.v[i].norm(), p.v[j].norm()));
-      if (passed == steps->surfaces.size()) return;
-      const auto [lo, hi] = std::minmax({p.id_of(i), p.id_of(j)});
-      visit(lo, hi, std::span(steps->surfaces).subspan(passed));
-    };
-  };
-  const auto look_at_all = [&](const Particles<D>& p) {
-    visit_close_pairs<D>(box, p.x, box.steps.reach()(p.radius), p.ghost, p.all_fixed(), look(p));
-  };
-  const Decomposition<D>& ranks = system.decomposition;
-  if (ranks.joined() && !ranks.by_place()) {
-    look_at_all(halo_of(box, 2 * box.steps.reach()(ranks.sizes().largest_radius()), ranks.ranks(), state));
-  } else if (known) {
-    const auto look_at = look(state);
-    for (const auto& [i, j, image] : known->cover(state.x)) look_at(i, j, image);
-  } else {
-    look_at_all(state);
-  }
+  visit_close_pairs(system, state, known, [&](const Particles<D>& p, Id i, Id j, const Image<D>& image) {
+    const PairSteps* const steps = box.steps.find(p.id_of(i), p.species[i], p.id_of(j), p.species[j]);
+    if (!steps) return;
+    const double sigma = p.radius[i] + p.radius[j];
+    const std::size_t passed = steps_passed<D>(*steps, {p.x[i] - p.x[j] + box.shift(image), p.v[i] - p.v[j]}, sigma,
+                                               side_tolerance(false, epoch, sigma, rounding),
+                                               approach_slack(sigma, p.v[i].norm(), p.v[j].norm()));
+    if (passed == steps->surfaces.size()) return;
+    const auto [lo, hi] = std::minmax({p.id_of(i), p.id_of(j)});
+    visit(lo, hi, std::span(steps->surfaces).subspan(passed));
+  });
 }
 
 }  // namespace

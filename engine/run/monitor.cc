@@ -9,9 +9,8 @@
 #include <utility>
 
 #include "engine/base/error.h"
-#include "engine/ranks/halo.h"
+#include "engine/ranks/close_pairs.h"
 #include "engine/run/measurement.h"
-#include "engine/search/sized_cells.h"
 
 namespace carom {
 
@@ -459,18 +458,7 @@ OverlapTally Monitor<D>::overlaps(double time) {
     const double depth = 1 - std::sqrt(squared) / sigma;
     found.note_overlap(depth, [&] { return Overlap(depth, sigma, pair_key<D>(time, 0, p.id_of(i), p.id_of(j), {})); });
   };
-  const auto look_at_all = [&](const Particles<D>& p) {
-    visit_close_pairs<D>(box, p.x, box.steps.reach()(p.radius), p.ghost, p.all_fixed(),
-                         [&](Id i, Id j, const Image<D>& image) { look(p, i, j, image); });
-  };
-  const Particles<D>& p = system_.particles;
-  const Decomposition<D>& ranks = system_.decomposition;
-  if (ranks.joined() && !ranks.by_place())
-    look_at_all(halo_of(box, 2 * box.steps.reach()(ranks.sizes().largest_radius()), ranks.ranks(), p));
-  else if (touching_)
-    for (const auto& [i, j, image] : touching_->cover(p.x)) look(p, i, j, image);
-  else
-    look_at_all(p);
+  visit_close_pairs(system_, system_.particles, touching_ ? &*touching_ : nullptr, look);
   return found;
 }
 

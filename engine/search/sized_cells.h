@@ -100,8 +100,8 @@ void need_finite_positions(std::span<const Vec<D>> x) {
 }
 
 /// Calls visit(i, j, image), j < i, once for each pair of particles that may touch: the distance of x_i from
-/// x_j − shift(image) may be the sum of their reaches. Excluded are pairs whose particle i is marked in `without`, and
-/// pairs of two particles marked in `fixed`; empty marks exclude none. Throws Error(Failure::numerical) if a
+/// x_j − shift(image) may be the sum of their reaches. Pairs in which particle i is marked in `without` are left out,
+/// and pairs in which both are marked in `fixed`; empty marks leave out none. Throws Error(Failure::numerical) if a
 /// position is not finite. One visit of all pairs costs far less than a NeighbourList.
 template <int D, class Visit>
 void visit_close_pairs(const Box<D>& box, std::span<const Vec<D>> x, std::span<const double> reach,
