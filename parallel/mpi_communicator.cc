@@ -172,10 +172,9 @@ std::vector<Bytes> MpiCommunicator::swap(std::vector<Bytes> outgoing, std::span<
   for (std::size_t k = 0; k < partners.size(); ++k) {
     const Bytes& all = outgoing_[k];
     Bytes &in = first_in_[k], &out = first_out_[k];
-    const std::uint64_t size = all.size();
-    out.resize(sizeof(size) + std::min(all.size(), kFirstMessage));
-    std::memcpy(out.data(), &size, sizeof(size));
-    std::copy_n(all.data(), out.size() - sizeof(size), out.data() + sizeof(size));
+    out.clear();
+    put(out, std::uint64_t{all.size()});
+    out.insert(out.end(), all.begin(), all.begin() + static_cast<std::ptrdiff_t>(std::min(all.size(), kFirstMessage)));
     in.resize(sizeof(std::uint64_t) + kFirstMessage);
     MPI_Irecv(in.data(), bytes(in.size()), MPI_BYTE, partners[k], first, world_, next());
     MPI_Isend(out.data(), bytes(out.size()), MPI_BYTE, partners[k], first, world_, next());

@@ -14,8 +14,9 @@ using Bytes = std::vector<std::byte>;
 
 /// Appends `size` bytes.
 inline void put_bytes(Bytes& to, const void* from, std::size_t size) {
-  const auto* const bytes = static_cast<const std::byte*>(from);
-  to.insert(to.end(), bytes, bytes + size);
+  const std::size_t at = to.size();
+  to.resize(at + size);
+  std::memcpy(to.data() + at, from, size);
 }
 
 /// Appends a value, byte by byte.

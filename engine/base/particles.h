@@ -42,6 +42,13 @@ struct Particle {
   Spin<D> spin = Spin<D>::Zero();  ///< angular velocity [1/time]
 };
 
+/// A particle that another rank owns (Particles::ghost), and where its pairs with particles of this rank are evaluated.
+enum Ghost : char {
+  kGhost = 1,          ///< here or on the rank of its owner, as evaluated_with_first() tells
+  kGhostHere = 2,      ///< here
+  kGhostElsewhere = 3  ///< on the rank of its owner, where the other particle is a kGhostHere
+};
+
 /// The rule for pairs of particles that two ranks own, with these ids: the pair is evaluated on the rank of the first
 /// one if this is true, else on that of the second. Each rank evaluates about half of the pairs.
 inline bool evaluated_with_first(Id a, Id b) { return ((a + b) % 2 == 0) == (a < b); }
@@ -56,7 +63,7 @@ struct Particles {
   std::vector<std::uint16_t> species;  ///< index into System::species
   std::vector<Image<D>> image;  ///< box edges crossed since the start, by axis; unwrapped position = x + image·edge
   std::vector<Spin<D>> spin{};  ///< angular velocity [1/time]; may be empty unless contacts are rough
-  std::vector<char> ghost{};    ///< 1: another rank owns it; empty: this rank owns all
+  std::vector<char> ghost{};    ///< a Ghost if another rank owns it, else 0; empty: this rank owns all
   std::vector<Id> id{};         ///< ascending; empty: 0, 1, …
 
   std::size_t size() const { return x.size(); }
@@ -103,7 +110,11 @@ struct Particles {
   }
   bool owns(Id i) const { return ghost.empty() || ghost[i] == 0; }
   /// Whether this rank evaluates a pair of which it owns one particle; if not, the owner of the other one does.
-  bool evaluates(Id i, Id j) const { return owns(evaluated_with_first(id_of(i), id_of(j)) ? i : j); }
+  bool evaluates(Id i, Id j) const {
+    if (owns(i) == owns(j)) return owns(i);
+    const char kind = ghost[owns(i) ? j : i];
+    return kind == kGhost ? owns(evaluated_with_first(id_of(i), id_of(j)) ? i : j) : kind == kGhostHere;
+  }
   Id id_of(Id i) const { return id.empty() ? i : id[i]; }
 };
 

@@ -156,7 +156,8 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
   Extent<D> extent;
   for (Id i = 0; i < step.x.size(); ++i)
     if (filter_.species.code(i) != 0)
-      (ghost_.empty() || ghost_[i] == 0 ? members : ghosts).push_back(i), extent.add(step.x[i]);
+      if (const bool own = ghost_.empty() || ghost_[i] == 0; own || ghost_[i] != kGhostElsewhere)
+        (own ? members : ghosts).push_back(i), extent.add(step.x[i]);
   records_.own = members.size();
   members.insert(members.end(), ghosts.begin(), ghosts.end());
   const double reach = cutoff_ + skin_.width();
@@ -206,7 +207,7 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
       for (int k = 0; k < D; ++k) (&records_.box.back().x)[k] = box[k];
     }
 
-  // The partners of an own particle are own particles in half of the cells around it, those of a ghost the own
+  // The partners of an own particle are own particles in half of the cells around it, the partners of a ghost own
   // particles in all cells around it, if this rank evaluates the pair.
   std::vector<PartnerRange> ranges;
   Cell<D> centre{};
@@ -280,7 +281,8 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
       found.plain = std::remove_if(plain.data() + size, found.plain, condition);
       found.other = std::remove_if(other_.data(), found.other, condition);
     };
-    if (ghost) remove([&](std::uint32_t r) { return !evaluated_with_first(id_[r], id_[row]); });
+    if (ghost && ghost_[records_.order[row]] == kGhost)
+      remove([&](std::uint32_t r) { return !evaluated_with_first(id_[r], id_[row]); });
     if (filter_.excluded)
       remove([&](std::uint32_t r) { return filter_.excludes(records_.order[row], records_.order[r]); });
     const auto add = [&](int to, std::size_t begin, std::size_t end) {

@@ -23,11 +23,12 @@ class Verlet : public Integrator<D> {
     x_.resize(p.size());
     v_ = p.v;
     FlowOfStep<D> flow(system, v_, accelerations_);
-    for (std::size_t i = 0; i < p.size(); ++i) {
+    for (Id i = 0; i < p.size(); ++i) {
+      if (!p.owns(i)) continue;  // ghosts get positions from their owners, and nothing else
       v_[i] += (0.5 * slab.length) * accelerations_.a[i];
       x_[i] = p.x[i] + slab.length * v_[i];
     }
-    // Ghosts get positions only. Nothing has changed yet if finish_step() throws.
+    // Nothing has changed yet if finish_step() throws.
     system.decomposition.start_step(x_, v_, slab.length);
     system.box.advance(slab.length);
     accelerations_.update(system, x_, report.counters, [&] { system.decomposition.finish_step(x_); });

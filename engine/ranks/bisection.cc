@@ -194,6 +194,19 @@ std::uint32_t Bisection<D>::owner(const Vec<D>& at) const {
 }
 
 template <int D>
+auto Bisection<D>::side(std::uint32_t subdomain, std::uint32_t other, const Vec<D>& at) const -> Side {
+  const Part &mine = parts_[subdomain], &theirs = parts_[other];
+  for (int k = 0; k < D; ++k) {
+    const double half = 0.5 * box_.edges[k];
+    if (!box_.periodic(k) || !(mine.high[k] <= theirs.low[k] || theirs.high[k] <= mine.low[k])) continue;
+    if (!(std::max(mine.half[k], theirs.half[k]) + reach_ < (1 - 1e-9) * half)) continue;
+    const double away = at[k] - mine.centre[k];  // the nearest image is above if this is in (0, ½] or below −½ edges
+    return (away > 0) == (std::abs(away) <= half) ? Side::above : Side::below;
+  }
+  return Side::unknown;
+}
+
+template <int D>
 bool Bisection<D>::clip(std::uint32_t subdomain, double margin, Vec<D>& low, Vec<D>& high) const {
   const Part& part = parts_[subdomain];
   for (int k = 0; k < D; ++k) {

@@ -53,6 +53,13 @@ class Bisection {
     for (const std::uint32_t r : neighbours_[own])
       if (near(r, at, reach)) visit(r);
   }
+  /// Where a position in another subdomain is, as seen from `subdomain`.
+  enum class Side { above, below, unknown };
+  /// The side on which all positions of subdomain `other` within reach are, where they are near this position in it.
+  /// Two positions within reach of each other see each other on opposite sides, or both on an unknown one. They are
+  /// compared along the first periodic axis that separates the subdomains and on which no position of either is within
+  /// reach of two images of another position.
+  Side side(std::uint32_t subdomain, std::uint32_t other, const Vec<D>& at) const;
   /// Whether a position is near a subdomain.
   bool near(std::uint32_t subdomain, const Vec<D>& at) const { return near(subdomain, at, reach_); }
   bool near(std::uint32_t subdomain, const Vec<D>& at, double reach) const {

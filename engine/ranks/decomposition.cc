@@ -55,6 +55,7 @@ template <int D>
 bool Decomposition<D>::divide(bool local, double slab_length, bool cores) {
   if (!joined()) return false;
   local_ = local;
+  points_ = !cores;
   width_.start(cores);
   migrate(slab_length);
   next_ = kSlabsPerDivision;
@@ -212,20 +213,23 @@ bool Decomposition<D>::migrate_to_near(double slab_length) {
   width_.fit(reach, speed * slab_length, 2 * system_.box.steps.reach()(sizes_->largest_radius()));
   if (!std::isfinite(width_.far())) return false;
   const Bisection<D> bisection(system_.box, own, blocks().ranks, width_.far(), *ranks_, work);
+  const bool one_sided =
+      points_ && std::ranges::none_of(system_.interactions, [](const auto& t) { return t->bonds(); });
+  const auto for_each_near = [&](const Vec<D>& x, auto&& visit) {
+    for_each_receiver(bisection, bisection.wrapped(x), one_sided, visit);
+  };
   std::vector<std::uint64_t> known(blocks().ranks);
-  for (const Vec<D>& x : own) bisection.for_each_near(bisection.wrapped(x), [&](std::uint32_t rank) { ++known[rank]; });
+  for (const Vec<D>& x : own) for_each_near(x, [&](std::uint32_t rank) { ++known[rank]; });
   const std::vector<std::uint64_t> mine = known;
   ranks_->sum(known);
   if (static_cast<double>(std::ranges::max(known)) > kMaxKnownFraction * static_cast<double>(total())) return false;
 
   std::vector<Fields::Arrival> stay;
   const bool again = by_place();  // at first the particles are in blocks, and the memory of these is freed
-  const auto messages = ranks_->swap(pack(
-      mine, [&](const Vec<D>& x, auto&& visit) { bisection.for_each_near(bisection.wrapped(x), visit); },
-      again ? &stay : nullptr));
+  const auto messages = ranks_->swap(pack(mine, for_each_near, again ? &stay : nullptr));
   layout_ = Layout::halos;
   receive_particles(system_.fields, system_.particles, messages, total(), std::move(stay));
-  assign(bisection, width_.near());
+  assign(bisection, width_.near(), one_sided);
   system_.fields.prepare_working();
   return true;
 }
@@ -244,9 +248,9 @@ void Decomposition<D>::migrate_to_all() {
 
 /// Sets the owners of this rank's particles; ghosts nearer than `near` matter. Makes the interactions for them.
 template <int D>
-void Decomposition<D>::assign(const Bisection<D>& bisection, double near) {
+void Decomposition<D>::assign(const Bisection<D>& bisection, double near, bool one_sided) {
   Particles<D>& p = system_.particles;
-  halo_.assign(bisection, system_.box, p, ranks_->rank(), near);
+  halo_.assign(bisection, system_.box, p, ranks_->rank(), near, one_sided);
   system_.interactions.resize(block_interactions_.size());
   for (std::size_t k = 0; k < block_interactions_.size(); ++k) {
     auto& term = system_.interactions[k];

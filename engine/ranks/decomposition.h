@@ -138,7 +138,7 @@ class Decomposition {
   bool uneven() const;
   std::vector<Bytes> pack(const std::vector<std::uint64_t>& particles, auto&& for_each_receiver,
                           std::vector<Fields::Arrival>* stay = nullptr);
-  void assign(const Bisection<D>& bisection, double near);
+  void assign(const Bisection<D>& bisection, double near, bool one_sided = false);
 
   System<D>& system_;
   Communicator alone_;
@@ -152,6 +152,7 @@ class Decomposition {
   Particles<D> block_;                                               // by place, only constant fields are up to date
   std::vector<std::unique_ptr<Interaction<D>>> block_interactions_;  // for the block, by place
   bool local_ = false;                                               // halos may be enough
+  bool points_ = false;                                              // particles do not collide
   bool fresh_ = false;                                               // no slab has been done since divide()
   HaloWidth width_;
   HaloExchange<D> halo_;

@@ -3,26 +3,36 @@
 // Owners of a rank's ghosts, ranks with ghosts of its own particles, and the exchange that updates ghosts.
 
 #include <cstring>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "engine/base/force_sums.h"
 #include "engine/base/particles.h"
+#include "engine/ranks/bisection.h"
 #include "engine/ranks/communicator.h"
 
 namespace carom {
 
+/// Calls visit(rank) for the owner of a position and the ranks that have a particle there as a ghost: those near it or,
+/// if `one_sided`, only those of them that may evaluate its pairs.
 template <int D>
-struct Box;
-template <int D>
-class Bisection;
+void for_each_receiver(const Bisection<D>& bisection, const Vec<D>& at, bool one_sided, auto&& visit) {
+  using Side = typename Bisection<D>::Side;
+  std::optional<std::uint32_t> owner;
+  bisection.for_each_near(at, [&](std::uint32_t rank) {
+    if (!owner) owner = rank;
+    if (!one_sided || rank == *owner || bisection.side(rank, *owner, at) != Side::below) visit(rank);
+  });
+}
 
 template <int D>
 class HaloExchange {
  public:
   /// Sets the owners of the particles on rank `me`, and the ranks that have its own ones as ghosts, from the bisection.
-  /// Ghosts within `near` of the rank's subdomain matter.
-  void assign(const Bisection<D>& bisection, const Box<D>& box, Particles<D>& p, int me, double near);
+  /// Ghosts within `near` of the rank's subdomain matter. `one_sided`: see for_each_receiver().
+  void assign(const Bisection<D>& bisection, const Box<D>& box, Particles<D>& p, int me, double near,
+              bool one_sided = false);
   /// Whether the motion of a ghost matters to own particles.
   bool matters(Id i) const { return matters_[i] != 0; }
   /// The largest squared displacement of an own particle since assign(), if it is at x with the image of `p`.
@@ -73,6 +83,7 @@ class HaloExchange {
   }
 
   Lists copied_to_, copies_of_;  // by rank: own particles with ghosts there; ghosts owned there
+  Lists felt_by_, felt_of_;      // the part of each of which the ghosts' rank may evaluate pairs
   std::vector<int> neighbours_;  // ranks with entries in either
   std::vector<char> matters_;
   std::vector<Vec<D>> at_;               // unwrapped positions at assign()

@@ -41,17 +41,19 @@ std::vector<Bytes> pack_own(const Fields& fields, const Particles<D>& p, const s
   return messages;
 }
 
-/// Replaces this rank's particles by those that stay, `arrivals`, and those in the messages, ordered by id and not
-/// marked as ghosts. No id may occur twice; `total` is the number of particles on all ranks.
+/// Replaces this rank's particles by those that stay, `arrivals` in the order of ids, and those in the messages,
+/// ordered by id and not marked as ghosts. No id may occur twice; `total` is the number of particles on all ranks.
 template <int D>
 void receive_particles(Fields& fields, Particles<D>& p, const std::vector<Bytes>& messages, std::size_t total,
                        std::vector<Fields::Arrival> arrivals = {}) {
+  const auto stayed = static_cast<std::ptrdiff_t>(arrivals.size());
   for (const Bytes& message : messages)
     for (Reader from(message); from.more();) {
       const Id id = from.template get<Id>();
       arrivals.push_back({id, 0, from.skip(fields.bytes())});
     }
-  std::ranges::sort(arrivals, {}, &Fields::Arrival::id);
+  std::ranges::sort(arrivals.begin() + stayed, arrivals.end(), {}, &Fields::Arrival::id);
+  std::ranges::inplace_merge(arrivals, arrivals.begin() + stayed, {}, &Fields::Arrival::id);
   fields.take(arrivals);
   p.id.clear();
   if (arrivals.size() < total)

@@ -27,10 +27,10 @@ std::vector<Vec<2>> random_places() {
 
 /// The part of all particles that one of four ranks has.
 struct Known {
-  explicit Known(int me) : bisection(kBox, random_places(), 4, kFar, alone) {
+  explicit Known(int me, bool one_sided = false) : bisection(kBox, random_places(), 4, kFar, alone) {
     const std::vector<Vec<2>> all = random_places();
     for (Id i = 0; i < all.size(); ++i)
-      bisection.for_each_near(all[i], [&](std::uint32_t rank) {
+      for_each_receiver(bisection, all[i], one_sided, [&](std::uint32_t rank) {
         if (rank != static_cast<std::uint32_t>(me)) return;
         p.id.push_back(i);
         p.x.push_back(all[i]);
@@ -38,7 +38,7 @@ struct Known {
       });
     p.image.resize(p.size());
     p.ghost.resize(p.size());
-    halo.assign(bisection, kBox, p, me, kNear);
+    halo.assign(bisection, kBox, p, me, kNear, one_sided);
   }
   Communicator alone;
   Bisection<2> bisection;
@@ -84,6 +84,37 @@ TEST(HaloExchange, CopiesGetTheValuesOfTheirOwners) {
   });
 }
 
+/// Of any pair within reach one rank evaluates: the one of the lower particle, where images tell which one is lower, and
+/// else that which the ids tell. If ghosts are one-sided, this rank has the other particle all the same.
+TEST(HaloExchange, OneRankEvaluatesEachPair) {
+  const std::vector<Vec<2>> all = random_places();
+  for (const bool one_sided : {false, true}) {
+    std::map<std::pair<Id, Id>, int> ranks;
+    std::map<char, int> ghosts;
+    for (const int me : {0, 1, 2, 3}) {
+      const Known known(me, one_sided);
+      for (Id g = 0; g < known.p.size(); ++g)
+        for (Id i = 0; i < known.p.size(); ++i) {
+          if (known.p.owns(g) || !known.p.owns(i)) continue;
+          ++ghosts[known.p.ghost[g]];
+          EXPECT_EQ(known.p.evaluates(i, g), known.p.evaluates(g, i));
+          if (known.p.evaluates(i, g)) ++ranks[std::minmax(known.p.id[i], known.p.id[g])];
+        }
+    }
+    const Known known(0);
+    for (Id i = 0; i < all.size(); ++i)
+      for (Id j = i + 1; j < all.size(); ++j) {
+        Vec<2> d = all[i] - all[j];
+        d[0] -= kBox.edges[0] * std::round(d[0] / kBox.edges[0]);
+        if (d.norm() > kFar || known.bisection.owner(all[i]) == known.bisection.owner(all[j])) continue;
+        EXPECT_EQ((ranks[{i, j}]), 1) << i << ' ' << j;
+      }
+    EXPECT_GT(ghosts[kGhost], 0);  // beyond the cut across the axis with walls
+    EXPECT_GT(ghosts[kGhostHere], 0);
+    EXPECT_EQ(ghosts[kGhostElsewhere] > 0, !one_sided);
+  }
+}
+
 /// Small forces, those of one rank so large that they need high words, and sums that have no room for more.
 TEST(HaloExchange, OwnersAddTheForcesOnCopies) {
   using Whole = ForceSums<2>::Whole;
@@ -100,6 +131,7 @@ TEST(HaloExchange, OwnersAddTheForcesOnCopies) {
       ForceSums<2> sums(known.p.size(), 1);
       const ForceLimits limits = sums.make_room(3);
       for (Id i = 0; i < known.p.size(); ++i) {
+        if (known.p.ghost[i] == kGhostElsewhere) continue;
         ASSERT_TRUE(sums.add(i, force(ranks.rank(), known.p.id[i]), limits));
         expected[me][known.p.id[i]] = sums.quanta(i);
       }
