@@ -144,6 +144,7 @@ auto Bisection<D>::cut(std::span<const Piece> pieces, Communicator& ranks) -> st
     const std::size_t below = piece.subdomains / 2;
     const double share = static_cast<double>(below) / static_cast<double>(piece.subdomains);
     cuts_.push_back({axis, low[axis] + (high[axis] - low[axis]) * share, 0, 0});
+    cut_axes_[axis] = 1;
     OrderStatistic& split = wanted.emplace_back();
     split.number = work[p] / piece.subdomains * below + work[p] % piece.subdomains * below / piece.subdomains;
     for (const Sphere& sphere : piece.spheres) split.elements.push_back({ordered(sphere.x[axis]), sphere.work});

@@ -71,6 +71,8 @@ class Bisection {
   double squared_distance(std::uint32_t subdomain, const Vec<D>& at) const {
     return squared_distance(parts_[subdomain], parts_[subdomain].half, at, at, at);
   }
+  /// A displacement without its parts along axes that no cut crosses: distances from subdomains do not depend on them.
+  Vec<D> across_cuts(const Vec<D>& way) const { return way.cwiseProduct(cut_axes_); }
   /// Reduces the box between two corners to the positions within `margin` of a subdomain; false if none is left.
   bool clip(std::uint32_t subdomain, double margin, Vec<D>& low, Vec<D>& high) const;
   /// The distance of a position in a subdomain from its faces; infinite if there are none, negative outside.
@@ -125,6 +127,7 @@ class Bisection {
   std::vector<Cut> cuts_;
   std::vector<std::vector<std::uint32_t>> neighbours_;
   std::int32_t root_ = 0;
+  Vec<D> cut_axes_ = Vec<D>::Zero();  // 1 along axes that cuts cross
 };
 
 }  // namespace carom

@@ -91,9 +91,10 @@ class Ownership {
   void forget(Slot i);
   void watch(double now);
   double update_role(Slot i, double now);
-  /// The largest speed of a sphere until its next event, not 0; under shear, across the flow.
+  /// The largest speed across cuts of a sphere until its next event, not 0. Under shear no cut crosses the flow's axis.
   double speed(Slot i) const {
-    return (1 + 1e-6) * core_.flights().speed(core_.flights()[i]) + from_field_ + std::numeric_limits<double>::min();
+    return (1 + 1e-6) * bisection_.across_cuts(core_.flights()[i].v).norm() + from_field_ +
+           std::numeric_limits<double>::min();
   }
 
   EventCore<D>& core_;
