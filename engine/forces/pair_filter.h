@@ -73,6 +73,8 @@ struct SpeciesRule {
   std::uint16_t a = 0, b = 0;
 
   bool all() const { return species_of == nullptr; }
+  /// Whether the particles of a pair have two species.
+  bool apart() const { return !all() && a != b; }
   /// The code of a particle in a PartnerSearch. The code of a partner must have one of the bits of partner_code().
   std::uint64_t code(Id i) const {
     if (all()) return PartnerSearch::kFirst;

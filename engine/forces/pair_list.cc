@@ -152,23 +152,34 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
   records_.partners[PairRecords<D>::kMoving].clear();
   records_.partners[PairRecords<D>::kSharedMoving].clear();
   sizes_ = {};
-  std::vector<Id> members, ghosts;
+  // Groups: own particles, then ghosts; if a pair has two species, own ones of each, then ghosts of each.
+  std::array<std::vector<Id>, 4> groups;
+  const bool apart = filter_.species.apart();
+  const unsigned of_own = apart ? 2 : 1;
   Extent<D> extent;
-  for (Id i = 0; i < step.x.size(); ++i)
-    if (filter_.species.code(i) != 0)
-      if (const bool own = ghost_.empty() || ghost_[i] == 0; own || ghost_[i] != kGhostElsewhere)
-        (own ? members : ghosts).push_back(i), extent.add(step.x[i]);
-  records_.own = members.size();
-  members.insert(members.end(), ghosts.begin(), ghosts.end());
+  for (Id i = 0; i < step.x.size(); ++i) {
+    const std::uint64_t code = filter_.species.code(i);
+    const bool ghost = !ghost_.empty() && ghost_[i] != 0;
+    if (code == 0 || (ghost && ghost_[i] == kGhostElsewhere)) continue;
+    groups[(ghost ? of_own : 0) + (apart && code == PartnerSearch::kSecond ? 1 : 0)].push_back(i);
+    extent.add(step.x[i]);
+  }
+  if (apart && groups[0].size() < groups[1].size())  // the fewer look for the more
+    std::swap(groups[0], groups[1]), std::swap(groups[2], groups[3]);
+  records_.own = groups[0].size() + (apart ? groups[1].size() : 0);
+  std::vector<Id> members;
+  for (const auto& group : groups) members.insert(members.end(), group.begin(), group.end());
+  const bool ghosts = members.size() > records_.own;
   const double reach = cutoff_ + skin_.width();
   const CellGrid<D> grid(box_, reach, extent, 2, kSlices);
   const Cell<D> range = grid.range(reach);
 
-  // Counting sort by cell, own particles before ghosts.
-  std::vector<std::uint32_t> at(members.size()), start((ghosts.empty() ? 1 : 2) * grid.cells() + 1);
-  for (std::size_t m = 0; m < members.size(); ++m) {
-    at[m] =
-        static_cast<std::uint32_t>(grid.index(grid.cell(step.x[members[m]])) + (m < records_.own ? 0 : grid.cells()));
+  // Counting sort by cell, one group after the other.
+  const std::size_t cells = grid.cells();
+  std::vector<std::uint32_t> at(members.size()), start((ghosts ? 2 : 1) * of_own * cells + 1);
+  for (std::size_t m = 0, g = 0, end = groups[0].size(); m < members.size(); ++m) {
+    while (m == end) end += groups[++g].size();
+    at[m] = static_cast<std::uint32_t>(grid.index(grid.cell(step.x[members[m]])) + g * cells);
     ++start[at[m] + 1];
   }
   const std::size_t fullest = *std::ranges::max_element(start);
@@ -178,12 +189,12 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
   for (std::size_t m = 0; m < members.size(); ++m) records_.order[next[at[m]]++] = members[m];
   double around = 1;
   for (int k = 0; k < D; ++k) around *= 2 * range[k] + 1;
-  records_.most_partners = static_cast<std::size_t>((ghosts.empty() ? 1 : 2) * around * static_cast<double>(fullest));
+  records_.most_partners = static_cast<std::size_t>((ghosts ? 2 : 1) * around * static_cast<double>(fullest));
 
   for (auto& coordinate : built_at_) coordinate.assign(members.size() + 8, 0);
   code_.assign(members.size() + 8, 0);
   id_.clear();
-  if (!ghosts.empty())
+  if (ghosts)
     for (const Id i : records_.order) id_.push_back(particles.id_of(i));
   bool any_moving = false;
   std::vector<Image<D>> boxes(members.size());
@@ -207,26 +218,30 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
       for (int k = 0; k < D; ++k) (&records_.box.back().x)[k] = box[k];
     }
 
-  // The partners of an own particle are own particles in half of the cells around it, the partners of a ghost own
-  // particles in all cells around it, if this rank evaluates the pair.
+  // The partners of an own particle are own particles in half of the cells around it, or those of the other species in
+  // all cells around it; so are the partners of a ghost, if this rank evaluates the pair.
   std::vector<PartnerRange> ranges;
   Cell<D> centre{};
   for (std::size_t c = 0; c + 1 < start.size(); ++c, grid.advance(centre)) {
     if (start[c] == start[c + 1]) continue;
-    const bool own = c < grid.cells();
+    const std::size_t group = c / cells;
+    if (apart && group == 0) continue;
+    const bool own = group < of_own, half = own && !apart;
+    const std::size_t theirs = apart && group == 2 ? cells : 0;  // where the group of the partners begins
     bool elsewhere = false;
     ranges.clear();
-    grid.for_each_range(centre, range, own, [&](std::size_t first, std::size_t end, const Image<D>& away) {
+    grid.for_each_range(centre, range, half, [&](std::size_t first, std::size_t end, const Image<D>& away) {
+      first += theirs, end += theirs;
       if (start[first] == start[end]) return;
       ranges.push_back({start[first], start[end], {}});
       for (int k = 0; k < D; ++k) ranges.back().image[k] = -away[k];
       elsewhere = elsewhere || !ranges.back().here();
     });
     if (elsewhere)  // equal images follow each other
-      std::ranges::stable_sort(ranges.begin() + (own ? 1 : 0), ranges.end(), {},
+      std::ranges::stable_sort(ranges.begin() + (half ? 1 : 0), ranges.end(), {},
                                [](const PartnerRange& part) { return std::pair(!part.here(), part.image); });
     for (std::uint32_t r = start[c]; r < start[c + 1] && !ranges.empty(); ++r) {
-      if (own) ranges[0].begin = r + 1;
+      if (half) ranges[0].begin = r + 1;
       find_pairs(r, ranges);
       if (sizes_[own ? 0 : 1] +
               records_.partners[own ? PairRecords<D>::kMoving : PairRecords<D>::kSharedMoving].size() >

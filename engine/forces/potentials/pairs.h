@@ -225,7 +225,7 @@ class AllPairs {
     ghost_ = particles.ghost;
     records_.clear();
     std::vector<std::uint32_t> end;  // ends of groups: by species, then own particles before ghosts
-    const bool apart = !filter_.species.all() && filter_.species.a != filter_.species.b;
+    const bool apart = filter_.species.apart();
     for (const std::uint64_t code : {PartnerSearch::kFirst, PartnerSearch::kSecond})
       for (const bool owned : {true, false}) {
         for (const Id odd : {0u, 1u})

@@ -87,8 +87,8 @@ TEST(CutoffList, HasPlacesBehindTheLastPartnerToo) {
 }
 
 /// Own particles come first; pairs of ghosts are not listed, and those of an own particle and a ghost on one of the two
-/// ranks, about half of them on each.
-TEST(CutoffList, TheListsOfTwoRanksHaveEachPairOnce) {
+/// ranks: about half of them on each if ids decide, or all on rank 0. `apart`: only pairs of two species are listed.
+void expect_each_pair_once_on_two_ranks(bool by_ids, bool apart) {
   constexpr double kCutoff = 1.5;
   Box<3> box;
   box.edges = {6, 5, 7};
@@ -97,36 +97,48 @@ TEST(CutoffList, TheListsOfTwoRanksHaveEachPairOnce) {
   const auto place = [&](int axis) { return box.edges[axis] * static_cast<double>(random() >> 11) * 0x1p-53; };
   Particles<3> p;
   for (int i = 0; i < 300; ++i) p.x.emplace_back(place(0), place(1), place(2));
+  for (int i = 0; i < 300; ++i) p.species.push_back(i % 5 == 0 ? 1 : 0);
+  PairFilter filter;
+  if (apart) filter.species = {&p.species, 0, 1};
   std::map<std::pair<Id, Id>, int> listed;
   std::array<double, 2> shared{};  // pairs
   for (const int rank : {0, 1}) {
     p.ghost.clear();
-    for (int i = 0; i < 300; ++i) p.ghost.push_back((i % 3 == 0) == (rank == 0));
-    CutoffList<3> list(box, kCutoff, {});
+    const char ghost = by_ids ? kGhost : rank == 0 ? kGhostHere : kGhostElsewhere;
+    for (int i = 0; i < 300; ++i) p.ghost.push_back((i % 3 == 0) == (rank == 0) ? ghost : 0);
+    CutoffList<3> list(box, kCutoff, filter);
     const PairRecords<3>& records = list.cover({.x = p.x}, p);
     EXPECT_EQ(records.own, rank == 0 ? 200u : 100u);
+    EXPECT_EQ(records.order.size(), ghost == kGhostElsewhere ? 100u : 300u);
     for (const auto kind :
          {PairRecords<3>::kPlain, PairRecords<3>::kMoving, PairRecords<3>::kShared, PairRecords<3>::kSharedMoving}) {
-      EXPECT_FALSE(records.runs[kind].empty()) << kind;
+      EXPECT_EQ(records.runs[kind].empty(), PairRecords<3>::shared(kind) && ghost == kGhostElsewhere) << kind;
       for (const PairRun& run : records.runs[kind])
         for (std::size_t k = run.begin; k < run.begin + run.count; ++k) {
           const Id i = records.order[run.row], j = records.order[records.partners[kind][k]];
           EXPECT_TRUE(p.owns(j));
           EXPECT_EQ(p.owns(i), !PairRecords<3>::shared(kind));
+          EXPECT_TRUE(!apart || p.species[i] != p.species[j]);
           shared[static_cast<std::size_t>(rank)] += p.owns(i) ? 0 : 1;
           ++listed[std::minmax(i, j)];
         }
     }
   }
-  EXPECT_NEAR(shared[0] / shared[1], 1, 0.2);
+  EXPECT_NEAR(shared[1] / shared[0], by_ids ? 1 : 0, 0.2);
   for (Id i = 0; i < p.size(); ++i)
     for (Id j = i + 1; j < p.size(); ++j) {
       const Vec<3> d = p.x[i] - p.x[j];
-      const bool near = (d + box.shift(box.nearest_image(d))).norm() <= kCutoff;
+      const bool near =
+          (d + box.shift(box.nearest_image(d))).norm() <= kCutoff && (!apart || p.species[i] != p.species[j]);
       const auto found = listed.find({i, j});
       EXPECT_LE(found == listed.end() ? 0 : found->second, 1);
       EXPECT_TRUE(!near || found != listed.end()) << i << " and " << j;
     }
+}
+
+TEST(CutoffList, TheListsOfTwoRanksHaveEachPairOnce) {
+  for (const bool by_ids : {true, false})
+    for (const bool apart : {false, true}) expect_each_pair_once_on_two_ranks(by_ids, apart);
 }
 
 TEST(PairSums, AreOfTheKernelsThatAreToBeUsed) {

@@ -84,8 +84,8 @@ TEST(HaloExchange, CopiesGetTheValuesOfTheirOwners) {
   });
 }
 
-/// Of any pair within reach one rank evaluates: the one of the lower particle, where images tell which one is lower, and
-/// else that which the ids tell. If ghosts are one-sided, this rank has the other particle all the same.
+/// Of any pair within reach one rank evaluates: the one of the lower particle, where images tell which one is lower,
+/// and else that which the ids tell. If ghosts are one-sided, this rank has the other particle all the same.
 TEST(HaloExchange, OneRankEvaluatesEachPair) {
   const std::vector<Vec<2>> all = random_places();
   for (const bool one_sided : {false, true}) {
