@@ -5,6 +5,7 @@
 
 #include <cstdlib>
 #include <new>
+#include <utility>
 #include <vector>
 
 #if defined(__linux__)
@@ -39,5 +40,22 @@ struct PageAllocator {
 /// A vector for large arrays of the event core; its memory starts at a cache line.
 template <class T>
 using PageVector = std::vector<T, PageAllocator<T>>;
+
+/// For arrays that are written before they are read: new elements are not initialized.
+template <class T>
+struct RawPageAllocator : PageAllocator<T> {
+  template <class U>
+  struct rebind {
+    using other = RawPageAllocator<U>;
+  };
+  RawPageAllocator() = default;
+  template <class U>
+  RawPageAllocator(const RawPageAllocator<U>&) {}  // NOLINT(google-explicit-constructor): the standard requires it
+  void construct(T* at) { ::new (static_cast<void*>(at)) T; }
+  template <class... Given>
+  void construct(T* at, Given&&... given) {
+    ::new (static_cast<void*>(at)) T(std::forward<Given>(given)...);
+  }
+};
 
 }  // namespace carom

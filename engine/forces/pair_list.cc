@@ -170,6 +170,8 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
   std::vector<Id> members;
   for (const auto& group : groups) members.insert(members.end(), group.begin(), group.end());
   const bool ghosts = members.size() > records_.own;
+  own_rows_ = {0, apart ? groups[1].size() : records_.own};
+  ghost_rows_ = {0, members.size() - records_.own};
   const double reach = cutoff_ + skin_.width();
   const CellGrid<D> grid(box_, reach, extent, 2, kSlices);
   const Cell<D> range = grid.range(reach);
@@ -255,7 +257,7 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
     }
   }
   for (const auto kind : {PairRecords<D>::kMoving, PairRecords<D>::kSharedMoving})
-    records_.partners[kind].resize(records_.partners[kind].size() + 8);
+    records_.partners[kind].insert(records_.partners[kind].end(), 8, 0);
   for (const std::size_t k : {0, 1}) {  // the search leaves invalid places beyond the last partner
     auto& partners = records_.partners[k == 0 ? PairRecords<D>::kPlain : PairRecords<D>::kShared];
     if (partners.size() < sizes_[k] + 8) partners.resize(sizes_[k] + 8);
@@ -269,6 +271,7 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
   const std::uint64_t code = code_[row];
   const double reach = (cutoff_ + skin_.width()) * (1 + 1e-12);
   const bool ghost = row >= records_.own;
+  ++(ghost ? ghost_rows_ : own_rows_).done;
   const auto kind = ghost ? PairRecords<D>::kShared : PairRecords<D>::kPlain;
   const auto moving_kind = ghost ? PairRecords<D>::kSharedMoving : PairRecords<D>::kMoving;
   auto& plain = records_.partners[kind];
@@ -285,7 +288,11 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
     std::size_t last = first, candidates = 16;
     for (; last < ranges.size() && ranges[last].as(ranges[first]); ++last)
       candidates += ranges[last].end - ranges[last].begin;
-    if (plain.size() < size + candidates) plain.resize(2 * (size + candidates));
+    if (const std::size_t needed = size + candidates; plain.size() < needed) {
+      // After a sixteenth of the rows their mean tells how long the list will be, within a few percent.
+      const auto& [done, all] = ghost ? ghost_rows_ : own_rows_;
+      plain.resize(needed + (16 * done < all ? needed : std::max(size / 4, 17 * size / (16 * done) * (all - done))));
+    }
     if (other_.size() < candidates) other_.resize(candidates);
     search.here = ranges[first].here();
     for (int k = 0; k < 3; ++k) search.own[k] = built_at_[k][row] + (k < D ? image[k] * box_.edges[k] : 0.0);

@@ -82,6 +82,9 @@ class CutoffList {
   std::vector<Id> id_;  // by place; empty if there are no ghosts
   std::vector<std::uint32_t> other_;
   std::array<std::size_t, 2> sizes_{};  // numbers of partners in kPlain and in kShared; the arrays are longer
+  struct Rows {
+    std::size_t done, all;
+  } own_rows_{}, ghost_rows_{};  // of a build: particles that have looked for partners
 };
 
 }  // namespace carom

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/base/force_sums.h"
+#include "engine/base/pages.h"
 #include "engine/forces/simd/pair_kernels.h"
 #include "engine/laws/box.h"
 
@@ -40,10 +41,11 @@ class PairRecords {
   std::vector<Id> order;  ///< particles by place
   std::size_t own = 0;    ///< the number of places of own particles, which come first
   std::vector<PairRun> runs[kKinds];
-  std::vector<std::uint32_t> partners[kKinds];  ///< followed by at least eight more, for padding
-  std::vector<PairRecord> box;                  ///< numbers of the boxes that the particles are in; empty: all 0
-  std::int32_t turns = 0;                       ///< Box::turns when the images were found
-  std::size_t most_partners = 0;                ///< upper bound for any particle
+  /// Places of partners, followed by at least eight more valid ones, for padding.
+  std::vector<std::uint32_t, RawPageAllocator<std::uint32_t>> partners[kKinds];
+  std::vector<PairRecord> box;    ///< numbers of the boxes that the particles are in; empty: all 0
+  std::int32_t turns = 0;         ///< Box::turns when the images were found
+  std::size_t most_partners = 0;  ///< upper bound for any particle
 
   /// Removes all but partners.
   void clear();

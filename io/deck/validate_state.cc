@@ -157,6 +157,22 @@ double shortest_period(const System<D>& system) {
   return 2 * std::numbers::pi / std::sqrt(largest_squared_frequency(system));
 }
 
+/// The number of pairs within reach of each other if the particles of all ranks were evenly distributed; 0 in an open
+/// box. Collective.
+template <int D>
+double pairs_at_mean_density(const System<D>& system) {
+  if (!system.box.closed()) return 0;
+  const double n = static_cast<double>(system.size());
+  double pairs = 0;
+  for (const auto& term : system.interactions) {
+    const double reach = system.decomposition.joined() ? term->reach(system.particles, system.decomposition.ranks())
+                                                       : term->reach(system.particles.x);
+    const double ball = D == 2 ? std::numbers::pi * reach * reach : 4.0 / 3 * std::numbers::pi * reach * reach * reach;
+    pairs += 0.5 * n * n * (std::isfinite(reach) ? ball / system.box.volume() : 1);
+  }
+  return pairs;
+}
+
 template <int D>
 void warn_of_state(const Deck& deck, System<D>& system, Problems& problems) {
   const Deck::Source& source = *deck.source;
@@ -187,7 +203,7 @@ void warn_of_state(const Deck& deck, System<D>& system, Problems& problems) {
 
   constexpr std::uint64_t affordable = 500'000;  // particles or pairs: below a second of work
   if (!source.integrator->stepping || deck.plan.accuracy > 0 || system.interactions.empty() ||
-      system.size() > affordable)
+      system.size() > affordable || pairs_at_mean_density(system) > affordable)
     return;
   system.quanta = quanta(system);
   system.decomposition.divide(true, deck.plan.step);

@@ -256,9 +256,8 @@ class AllPairs {
     }
     for (const auto kind : {PairRecords<D>::kPlain, PairRecords<D>::kShared}) {
       auto& partners = records_.partners[kind];
-      partners.resize(records_.order.size());
-      std::iota(partners.begin(), partners.end(), 0u);
-      partners.resize(partners.size() + 8);
+      partners.assign(records_.order.size() + 8, 0u);
+      std::iota(partners.begin(), partners.end() - 8, 0u);
     }
   }
 
