@@ -147,8 +147,8 @@ struct Tally {
   double worst = 0;
 };
 
-/// The error as a multiple of the allowed error; infinite for NaN. Up to a thousand terms that are no normal doubles may
-/// be lost.
+/// The error as a multiple of the allowed error; infinite for NaN. A thousand terms that are no normal doubles may be
+/// lost.
 Real excess(double value, Real expected, Real error) {
   if (value == expected) return 0;
   const Real off = std::abs(value - expected) / (error + 1000 * Real{std::numeric_limits<double>::min()});

@@ -84,8 +84,7 @@ TEST(HaloExchange, CopiesGetTheValuesOfTheirOwners) {
   });
 }
 
-/// Of any pair within reach one rank evaluates: the one of the lower particle, where images tell which one is lower,
-/// and else that which the ids tell. If ghosts are one-sided, this rank has the other particle all the same.
+/// One rank evaluates each pair within reach, also if ghosts are one-sided: then it still has both particles.
 TEST(HaloExchange, OneRankEvaluatesEachPair) {
   const std::vector<Vec<2>> all = random_places();
   for (const bool one_sided : {false, true}) {
