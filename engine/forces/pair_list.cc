@@ -291,7 +291,9 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
     if (const std::size_t needed = size + candidates; plain.size() < needed) {
       // After a sixteenth of the rows their mean tells how long the list will be, within a few percent.
       const auto& [done, all] = ghost ? ghost_rows_ : own_rows_;
-      plain.resize(needed + (16 * done < all ? needed : std::max(size / 4, 17 * size / (16 * done) * (all - done))));
+      const std::size_t most = kMaxPairs + kMaxPartners * particles_;  // more are an error
+      const std::size_t more = 16 * done < all ? needed : std::max(size / 4, 17 * size / (16 * done) * (all - done));
+      plain.resize(std::min(needed + more, std::max(needed, most)));
     }
     if (other_.size() < candidates) other_.resize(candidates);
     search.here = ranges[first].here();
@@ -327,8 +329,16 @@ void CutoffList<D>::find_pairs(std::uint32_t row, std::span<const PartnerRange> 
 template <int D>
 void CutoffList<D>::add_listed_pairs(std::span<std::uint32_t> of_particle) const {
   if (!made_) return;
-  for (const auto& runs : records_.runs)
-    for (const PairRun& run : runs) of_particle[records_.order[run.row]] += run.count;
+  using Records = PairRecords<D>;
+  for (const auto kind : {Records::kPlain, Records::kMoving, Records::kShared, Records::kSharedMoving})
+    for (const PairRun& run : records_.runs[kind]) {
+      if (!Records::shared(kind)) {
+        of_particle[records_.order[run.row]] += run.count;
+        continue;
+      }
+      const auto first = records_.partners[kind].begin() + run.begin;  // own particles, the row is a ghost
+      std::for_each(first, first + run.count, [&](std::uint32_t r) { ++of_particle[records_.order[r]]; });
+    }
 }
 
 template class CutoffList<2>;

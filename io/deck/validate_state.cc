@@ -157,20 +157,19 @@ double shortest_period(const System<D>& system) {
   return 2 * std::numbers::pi / std::sqrt(largest_squared_frequency(system));
 }
 
-/// The number of pairs within reach of each other if the particles of all ranks were evenly distributed; 0 in an open
-/// box. Collective.
+/// The number of pairs on all ranks if the particles were evenly distributed and all had the longest reach of any term;
+/// 0 in an open box. Collective.
 template <int D>
 double pairs_at_mean_density(const System<D>& system) {
   if (!system.box.closed()) return 0;
+  double reach = 0;
+  for (const auto& term : system.interactions)
+    reach = std::max(reach, system.decomposition.joined() ? term->reach(system.particles, system.decomposition.ranks())
+                                                          : term->reach(system.particles.x));
+  reach = system.decomposition.largest(reach);  // that of bonds is known on the ranks that have them
   const double n = static_cast<double>(system.size());
-  double pairs = 0;
-  for (const auto& term : system.interactions) {
-    const double reach = system.decomposition.joined() ? term->reach(system.particles, system.decomposition.ranks())
-                                                       : term->reach(system.particles.x);
-    const double ball = D == 2 ? std::numbers::pi * reach * reach : 4.0 / 3 * std::numbers::pi * reach * reach * reach;
-    pairs += 0.5 * n * n * (std::isfinite(reach) ? ball / system.box.volume() : 1);
-  }
-  return pairs;
+  const double ball = D == 2 ? std::numbers::pi * reach * reach : 4.0 / 3 * std::numbers::pi * reach * reach * reach;
+  return 0.5 * n * n * (std::isfinite(reach) ? ball / system.box.volume() : 1);
 }
 
 template <int D>
