@@ -46,11 +46,11 @@ struct Particle {
 enum Ghost : char {
   kGhost = 1,          ///< here or on the rank of its owner, as evaluated_with_first() tells
   kGhostHere = 2,      ///< here
-  kGhostElsewhere = 3  ///< on the rank of its owner, where the other particle is a kGhostHere
+  kGhostElsewhere = 3  ///< on the rank of its owner, which has partners within reach as kGhostHere
 };
 
-/// The rule for pairs of particles that two ranks own, with these ids: the pair is evaluated on the rank of the first
-/// one if this is true, else on that of the second. Each rank evaluates about half of the pairs.
+/// The rule for pairs with a kGhost, with these ids: the pair is evaluated on the rank of the first particle if this is
+/// true, else on that of the second. Each rank evaluates about half of the pairs.
 inline bool evaluated_with_first(Id a, Id b) { return ((a + b) % 2 == 0) == (a < b); }
 
 template <int D>

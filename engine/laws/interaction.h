@@ -8,7 +8,7 @@
 // (force_sums.h), so no sum depends on how the pairs were found.
 //
 // If a system is divided among ranks (engine/ranks/decomposition.h), sums over the system run over what this rank
-// evaluates: its particles, pairs of them, and about half of their pairs with ghosts (Particles::evaluates). Forces on
+// evaluates: its particles, pairs of them, and some of their pairs with ghosts (Particles::evaluates). Forces on
 // ghosts must then be added to those on the particles of their owners (Decomposition::add_ghosts). A term in which each
 // particle feels all others, as the waves of an Ewald sum, adds up sums of all ranks in add_…(): all ranks call these
 // functions in the same order.
@@ -115,7 +115,8 @@ class Interaction {
   /// ranks that make their lists in the same steps wait less for each other.
   virtual bool ages() const { return false; }
   virtual void renew() const {}
-  /// Adds to each particle the number of its pairs in the last list, where a pair counts for one of its particles only.
+  /// Adds to each particle the number of its pairs in the last list, where a pair counts for one of its particles only,
+  /// which this rank owns.
   virtual void add_listed_pairs(std::span<std::uint32_t> /*of_particle*/) const {}
 
   /// Adds −∇̄_i V(x, x_new), the discrete gradient: Σ_i ∇̄_i V·(x_new_i − x_i) = V(x_new) − V(x) (Gonzalez 1996; for
@@ -141,7 +142,7 @@ class Interaction {
   /// The distance from x within which other particles matter, as far as this rank knows [length]; infinite: all
   /// particles do.
   virtual double reach(Positions<D> x) const = 0;
-  /// The reach of a term that was made for a block of the particles. Collective.
+  /// The reach of a term that was made for a block of the particles; the largest one of all ranks counts. Collective.
   virtual double reach(const Particles<D>& block, Communicator& ranks) const = 0;
 
   /// The number of this rank's pairs (or particles, for a field) within reach in one evaluation: the unit of

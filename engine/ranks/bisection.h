@@ -53,12 +53,11 @@ class Bisection {
     for (const std::uint32_t r : neighbours_[own])
       if (near(r, at, reach)) visit(r);
   }
-  /// Where a position in another subdomain is, as seen from `subdomain`.
   enum class Side { above, below, unknown };
-  /// The side on which all positions of subdomain `other` within reach are, where they are near this position in it.
-  /// Two positions within reach of each other see each other on opposite sides, or both on an unknown one. They are
-  /// compared along the first periodic axis that separates the subdomains and on which no position of either is within
-  /// reach of two images of another position.
+  /// Whether this position in subdomain `other`, if it is within reach of a position in `subdomain`, is above or below
+  /// that one. Of two positions within reach of each other, one is above the other as seen from either subdomain, or it
+  /// is unknown to both. The axis is the first periodic one that separates the subdomains and is so long that no
+  /// position in one of them is within reach of two images of a position in the other.
   Side side(std::uint32_t subdomain, std::uint32_t other, const Vec<D>& at) const;
   /// Whether a position is near a subdomain.
   bool near(std::uint32_t subdomain, const Vec<D>& at) const { return near(subdomain, at, reach_); }

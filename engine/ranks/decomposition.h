@@ -7,15 +7,15 @@
 //
 // * in blocks of consecutive ids (id_blocks.h): at the start, between epochs of free flight, and for files;
 // * by place, for methods with forces: one rank owns each particle, and the ranks near it have copies, the ghosts of
-//   their halo (Particles::ghost). One of the two ranks that share a pair evaluates it. The owner of a particle adds up
-//   the forces on it and on its ghosts, in integers, and sends the sum back: it has the bits of a single rank. Cheap
-//   work is done by each rank for all particles that it has.
+//   their halo (Particles::ghost), at least if they evaluate pairs with them. One of the two ranks that share a pair
+//   evaluates it. The owner of a particle adds up the forces on it and on its ghosts, in integers, and sends the sum
+//   back: it has the bits of a single rank. Cheap work is done by each rank for all particles that it has.
 //
-// A rank advances its ghosts like its own particles. Ghosts at the rim of the halo lack partners and may become wrong,
-// so the ranks check that the ghosts that matter had the same events as on their owners (engine/stepping/slab_core.h).
-// If not, the slab is repeated with a larger halo (halo_width.h), finally with all particles on each rank. Before any
-// particle has moved too far, particles migrate: each owner sends it, with its fields, to the ranks that need it
-// (migration.h).
+// If particles have cores, a rank advances its ghosts like its own particles. Ghosts at the rim of the halo lack
+// partners and may become wrong, so the ranks check that the ghosts that matter had the same events as on their owners
+// (engine/stepping/slab_core.h). If not, the slab is repeated with a larger halo (halo_width.h), finally with all
+// particles on each rank. Before any particle has moved too far, particles migrate: each owner sends it, with its
+// fields, to the ranks that need it (migration.h).
 
 #include <memory>
 #include <optional>
@@ -83,7 +83,8 @@ class Decomposition {
   // Particles by place, for methods with forces.
 
   /// Divides the particles by place. `local`: a rank needs only its own and nearby particles for slabs of this length
-  /// [time]; otherwise all ranks have all. `cores`: particles collide. Returns false if there is only one rank.
+  /// [time]; otherwise all ranks have all. `cores`: particles collide; if not, a rank lacks ghosts with which it
+  /// evaluates no pairs, and the others get positions only. Returns false if there is only one rank.
   bool divide(bool local, double slab_length, bool cores = true);
   /// Call before a slab: divides again if that is due; returns whether it did.
   bool divide_if_due(std::int64_t slab, double slab_length);

@@ -84,7 +84,7 @@ class HaloExchange {
 
   Lists copied_to_, copies_of_;  // by rank: own particles with ghosts there; ghosts owned there
   Lists felt_by_, felt_of_;      // the part of each of which the ghosts' rank may evaluate pairs
-  std::vector<int> neighbours_;  // ranks with entries in either
+  std::vector<int> neighbours_;  // ranks with entries in copied_to_ or copies_of_
   std::vector<char> matters_;
   std::vector<Vec<D>> at_;               // unwrapped positions at assign()
   mutable std::vector<Bytes> outgoing_;  // the next messages, in memory that is used again

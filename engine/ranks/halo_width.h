@@ -4,10 +4,10 @@
 // the same values.
 //
 // A division is valid until a particle is displaced by more than the slack; in each slab no path may exceed an allowed
-// length. A rank has all particles within the reach of forces plus twice the slack and twice the path of its part of
-// the box. Ghosts matter if their contacts may be contacts of its own particles: they are within the largest diameter
-// plus twice the slack and the path. Ghosts beyond, to the depth over which collisions propagate errors from the rim,
-// keep these ghosts correct. The end points of all other ghosts come from their owners.
+// length. A rank has all particles that it needs within the reach of forces plus twice the slack and twice the path of
+// its part of the box. Ghosts matter if their contacts may be contacts of its own particles: they are within the
+// largest diameter plus twice the slack and the path. Ghosts beyond, to the depth over which collisions propagate
+// errors from the rim, keep these ghosts correct. The end points of all other ghosts come from their owners.
 
 #include <utility>
 
