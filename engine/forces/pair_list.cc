@@ -155,7 +155,7 @@ void CutoffList<D>::build(const PairStep<D>& step, const Particles<D>& particles
   // Groups: own particles, then ghosts; if a pair has two species, own ones of each, then ghosts of each.
   std::array<std::vector<Id>, 4> groups;
   const bool apart = filter_.species.apart();
-  const unsigned of_own = apart ? 2 : 1;
+  const std::size_t of_own = apart ? 2 : 1;
   Extent<D> extent;
   for (Id i = 0; i < step.x.size(); ++i) {
     const std::uint64_t code = filter_.species.code(i);
