@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <map>
+#include <numeric>
 #include <random>
 
 #include "engine/forces/pair_list.h"
@@ -110,11 +111,12 @@ void expect_each_pair_once_on_two_ranks(bool by_ids, bool apart) {
     const PairRecords<3>& records = list.cover({.x = p.x}, p);
     EXPECT_EQ(records.own, rank == 0 ? 200u : 100u);
     EXPECT_EQ(records.order.size(), ghost == kGhostElsewhere ? 100u : 300u);
+    std::size_t pairs = 0;
     for (const auto kind :
          {PairRecords<3>::kPlain, PairRecords<3>::kMoving, PairRecords<3>::kShared, PairRecords<3>::kSharedMoving}) {
       EXPECT_EQ(records.runs[kind].empty(), PairRecords<3>::shared(kind) && ghost == kGhostElsewhere) << kind;
       for (const PairRun& run : records.runs[kind])
-        for (std::size_t k = run.begin; k < run.begin + run.count; ++k) {
+        for (std::size_t k = run.begin; k < run.begin + run.count; ++k, ++pairs) {
           const Id i = records.order[run.row], j = records.order[records.partners[kind][k]];
           EXPECT_TRUE(p.owns(j));
           EXPECT_EQ(p.owns(i), !PairRecords<3>::shared(kind));
@@ -123,6 +125,10 @@ void expect_each_pair_once_on_two_ranks(bool by_ids, bool apart) {
           ++listed[std::minmax(i, j)];
         }
     }
+    std::vector<std::uint32_t> work(p.size());
+    list.add_listed_pairs(work);
+    EXPECT_EQ(std::accumulate(work.begin(), work.end(), std::size_t{0}), pairs);
+    for (Id i = 0; i < p.size(); ++i) EXPECT_TRUE(p.owns(i) || work[i] == 0);
   }
   EXPECT_NEAR(shared[1] / shared[0], by_ids ? 1 : 0, 0.2);
   for (Id i = 0; i < p.size(); ++i)
